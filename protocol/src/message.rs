@@ -1,0 +1,668 @@
+//! Every message of the protocol, with its limits and its checks.
+//!
+//! Joining: a client queries [`JoinRequest`], gets [`JoinReply`]; from then on it puts sealed [`InputPacket`]s and
+//! receives [`Snapshot`]s and [`EventMessage`]s. Anybody may query [`Description`], [`Status`] and [`TickRecords`].
+
+use serde::{Deserialize, Serialize};
+
+use crate::codec::{Message, WireError, require};
+use crate::seal::SessionKey;
+
+/// Longest player name, bytes.
+pub const NAME_MAX: usize = 32;
+/// Longest free text in a message, bytes.
+pub const TEXT_MAX: usize = 256;
+/// Most input frames in one packet: the newest and its predecessors.
+pub const INPUT_FRAMES_MAX: usize = 8;
+
+// --- joining -------------------------------------------------------------------------------------------------------
+
+/// What a client wants to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Role {
+    /// Gets a slot and a vehicle.
+    Player,
+    /// Gets a slot and snapshots, and drives nothing.
+    Spectator,
+}
+
+/// Query payload on [`join`](crate::Keys::join).
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct JoinRequest {
+    /// Name to show, 1 to 32 bytes without control characters.
+    pub name: String,
+    /// Player or spectator.
+    pub role: Role,
+}
+
+impl Message for JoinRequest {
+    const KIND: u8 = 1;
+    const MAX_BYTES: usize = 128;
+    fn validate(&self) -> Result<(), WireError> {
+        let printable = !self.name.trim().is_empty() && !self.name.chars().any(char::is_control);
+        require(printable && self.name.len() <= NAME_MAX, "name", "1 to 32 bytes without control characters")
+    }
+}
+
+/// Answer to a [`JoinRequest`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum JoinReply {
+    /// The session exists now.
+    Accepted(Box<JoinAccepted>),
+    /// No session; the text is for a person.
+    Refused(Refusal),
+}
+
+/// Why a join was refused.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+pub enum Refusal {
+    /// The client speaks another protocol version.
+    #[error("the server speaks protocol version {server}, this client {client}: use a client of the server's version")]
+    Version {
+        /// Version of the server.
+        server: u16,
+        /// Version that the client sent.
+        client: u16,
+    },
+    /// The request could not be read.
+    #[error("malformed join request: {0}")]
+    Malformed(String),
+    /// Every slot is taken.
+    #[error("the server is full ({slots} slots): try again later, or start it with more")]
+    Full {
+        /// Number of slots of the server.
+        slots: u16,
+    },
+    /// The server is about to end.
+    #[error("the server is closing")]
+    Closing,
+}
+
+/// A session.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JoinAccepted {
+    /// Number of the place; part of the session's key expressions.
+    pub slot: u16,
+    /// Tells this session from earlier ones on the same slot.
+    pub epoch: u32,
+    /// Secret that seals this session's inputs.
+    pub session_key: SessionKey,
+    /// Length of a tick is 1 s / this, Hz.
+    pub tick_hz: u16,
+    /// A session that sends no input for so long is ended, ms.
+    pub input_timeout_ms: u32,
+    /// The session's own actor; `None` for a spectator.
+    pub actor: Option<u32>,
+    /// The world at [`Description::tick`].
+    pub description: Description,
+}
+
+impl Message for JoinReply {
+    const KIND: u8 = 2;
+    const MAX_BYTES: usize = Description::MAX_BYTES + 1024;
+    fn validate(&self) -> Result<(), WireError> {
+        match self {
+            Self::Refused(_) => Ok(()),
+            Self::Accepted(accepted) => {
+                require((1..=1000).contains(&accepted.tick_hz), "tick_hz", "1 to 1000")?;
+                accepted.description.validate()
+            }
+        }
+    }
+}
+
+// --- what there is -------------------------------------------------------------------------------------------------
+
+/// What the numbers of the snapshots belong to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Description {
+    /// Name of the arena, as in the key expressions.
+    pub arena: String,
+    /// What a person calls it.
+    pub title: String,
+    /// Tick at which this was true.
+    pub tick: u64,
+    /// Number of the last event that is contained in it.
+    pub event_sequence: u32,
+    /// Acceleration, m/s².
+    pub gravity: [f32; 3],
+    /// Geometry that never moves.
+    pub statics: Vec<StaticDescription>,
+    /// Everything that has game logic, in order of id.
+    pub actors: Vec<ActorDescription>,
+}
+
+/// A piece of static geometry.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StaticDescription {
+    /// Its shape.
+    pub shape: Shape,
+    /// Where it stands, m.
+    pub position: [f32; 3],
+    /// Unit quaternion x y z w, shape to world.
+    pub rotation: [f32; 4],
+}
+
+/// An actor and the slices that it consists of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ActorDescription {
+    /// Identifies the actor for as long as it lives; never used twice in a run.
+    pub id: u32,
+    /// `vehicle`, `crate`, ...
+    pub kind: String,
+    /// What a person calls it; the player's name for a player's vehicle.
+    pub name: String,
+    /// Slot of the session that drives it.
+    pub slot: Option<u16>,
+    /// Its parts; the first is the one that says where the actor is.
+    pub parts: Vec<PartDescription>,
+}
+
+/// A slice with a shape.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PartDescription {
+    /// [`Slice::id`](crate::slices::Slice::id) in the snapshots.
+    pub slice: u32,
+    /// Shape in the slice's frame.
+    pub shape: Shape,
+}
+
+/// Shapes, metres, in their own frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Shape {
+    /// Everything below the plane through the origin.
+    HalfSpace {
+        /// Unit normal, points out of the ground.
+        normal: [f32; 3],
+    },
+    /// Ball around the origin.
+    Ball {
+        /// Radius.
+        radius: f32,
+    },
+    /// Box around the origin.
+    Box {
+        /// Half extents.
+        half: [f32; 3],
+    },
+    /// Segment along x, spherically extruded.
+    Capsule {
+        /// Half length of the segment.
+        half_length: f32,
+        /// Radius.
+        radius: f32,
+    },
+    /// Cylinder along z, its edges rounded.
+    Cylinder {
+        /// Half length along z.
+        half_length: f32,
+        /// Radius.
+        radius: f32,
+        /// Radius of the rounded edge, contained in the other two.
+        rounding: f32,
+    },
+    /// Convex hull, spherically extruded.
+    Hull {
+        /// Its vertices.
+        points: Vec<[f32; 3]>,
+        /// Extrusion radius.
+        radius: f32,
+    },
+}
+
+impl Message for Description {
+    const KIND: u8 = 3;
+    const MAX_BYTES: usize = 2 << 20;
+    fn validate(&self) -> Result<(), WireError> {
+        let poses = self.statics.iter().all(|s| all_finite(&s.position) && all_finite(&s.rotation));
+        require(poses && all_finite(&self.gravity), "description numbers", "finite")?;
+        let parts = self.actors.iter().flat_map(|a| a.parts.iter().map(|p| &p.shape));
+        let shapes = self.statics.iter().map(|s| &s.shape).chain(parts);
+        require(shapes.into_iter().all(Shape::is_sane), "shape", "finite, no negative size, at most 256 points")?;
+        let texts = self.actors.iter().flat_map(|a| [&a.kind, &a.name]).chain([&self.arena, &self.title]);
+        require(texts.into_iter().all(|t| t.len() <= TEXT_MAX), "text", "at most 256 bytes")
+    }
+}
+
+impl Shape {
+    fn is_sane(&self) -> bool {
+        let size = |x: f32| x.is_finite() && x >= 0.0;
+        match self {
+            Self::HalfSpace { normal } => all_finite(normal),
+            Self::Ball { radius } => size(*radius),
+            Self::Box { half } => half.iter().all(|&x| size(x)),
+            Self::Capsule { half_length, radius } => size(*half_length) && size(*radius),
+            Self::Cylinder { half_length, radius, rounding } => size(*half_length) && size(*radius) && size(*rounding),
+            Self::Hull { points, radius } => {
+                points.len() <= 256 && points.iter().all(|p| all_finite(p)) && size(*radius)
+            }
+        }
+    }
+}
+
+fn all_finite(numbers: &[f32]) -> bool {
+    numbers.iter().all(|x| x.is_finite())
+}
+
+// --- driving -------------------------------------------------------------------------------------------------------
+
+/// The state of a player's controls.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Controls {
+    /// 0 to 1.
+    pub throttle: f32,
+    /// 0 to 1.
+    pub brake: f32,
+    /// −1 (left) to 1 (right).
+    pub steer: f32,
+    /// Bit set of [`buttons`].
+    pub buttons: u16,
+}
+
+/// Bits of [`Controls::buttons`].
+pub mod buttons {
+    /// Drive backwards.
+    pub const REVERSE: u16 = 1;
+    /// Block the rear wheels.
+    pub const HANDBRAKE: u16 = 2;
+    /// Put the vehicle back on its wheels where it is.
+    pub const RESET: u16 = 4;
+}
+
+impl Controls {
+    /// # Errors
+    /// [`WireError::Content`] for a value that is not finite or out of range.
+    pub fn validate(&self) -> Result<(), WireError> {
+        require((0.0..=1.0).contains(&self.throttle), "throttle", "0 to 1")?;
+        require((0.0..=1.0).contains(&self.brake), "brake", "0 to 1")?;
+        require((-1.0..=1.0).contains(&self.steer), "steer", "-1 to 1")
+    }
+}
+
+/// Controls at one tick.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct InputFrame {
+    /// Strictly increasing within a session, from 1.
+    pub sequence: u32,
+    /// Tick for which the client meant it.
+    pub tick: u64,
+    /// The controls.
+    pub controls: Controls,
+}
+
+/// Put on [`input`](crate::Keys::input), sealed by [`seal`](crate::seal::seal).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct InputPacket {
+    /// [`JoinAccepted::epoch`] of the session.
+    pub epoch: u32,
+    /// Newest snapshot that this client has: its acknowledgement.
+    pub snapshot_tick: u64,
+    /// The client leaves; nothing follows.
+    pub leave: bool,
+    /// The newest frame last, before it those that may have been lost.
+    pub frames: Vec<InputFrame>,
+}
+
+impl Message for InputPacket {
+    const KIND: u8 = 4;
+    const MAX_BYTES: usize = 512;
+    fn validate(&self) -> Result<(), WireError> {
+        require((1..=INPUT_FRAMES_MAX).contains(&self.frames.len()), "frames", "1 to 8")?;
+        let ascending = self.frames.windows(2).all(|w| w[0].sequence < w[1].sequence);
+        require(ascending && self.frames[0].sequence > 0, "sequence", "ascending from 1")?;
+        self.frames.iter().try_for_each(|frame| frame.controls.validate())
+    }
+}
+
+// --- what happens --------------------------------------------------------------------------------------------------
+
+/// What became of a session's inputs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InputAck {
+    /// Newest sequence that was applied; 0 before the first.
+    pub sequence: u32,
+    /// Tick at which it was applied.
+    pub tick: u64,
+}
+
+/// Put on [`snapshot`](crate::Keys::snapshot) after each tick.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Snapshot {
+    /// Tick whose end this is; gaps in it are lost snapshots.
+    pub tick: u64,
+    /// Inputs of the session that this snapshot is for.
+    pub ack: InputAck,
+    /// Number of the last event before this snapshot.
+    pub event_sequence: u32,
+    /// All DOF, as [`slices`](crate::slices) packs them.
+    #[serde(with = "bytes")]
+    pub dof: Vec<u8>,
+}
+
+impl Message for Snapshot {
+    const KIND: u8 = 5;
+    const MAX_BYTES: usize = 4 << 20;
+    fn validate(&self) -> Result<(), WireError> {
+        Ok(())
+    }
+}
+
+/// Put on [`event`](crate::Keys::event).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EventMessage {
+    /// Counts up by one; a gap means that [`Description`] has to be asked for again.
+    pub sequence: u32,
+    /// Tick at which it happened.
+    pub tick: u64,
+    /// What happened.
+    pub event: Event,
+}
+
+/// Something that happens once.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Event {
+    /// An actor came into the arena.
+    ActorAdded(ActorDescription),
+    /// An actor and all of its slices are gone.
+    ActorRemoved {
+        /// [`ActorDescription::id`].
+        id: u32,
+    },
+    /// A session began.
+    Joined {
+        /// Its slot.
+        slot: u16,
+        /// Its name.
+        name: String,
+    },
+    /// A session ended.
+    Left {
+        /// Its slot.
+        slot: u16,
+        /// For a person: `left`, `connection lost`, `no input for 5 s`.
+        reason: String,
+    },
+    /// The server ends.
+    Closing {
+        /// For a person.
+        reason: String,
+    },
+}
+
+impl Message for EventMessage {
+    const KIND: u8 = 6;
+    const MAX_BYTES: usize = 64 << 10;
+    fn validate(&self) -> Result<(), WireError> {
+        match &self.event {
+            Event::ActorAdded(actor) => {
+                let texts = actor.kind.len() <= TEXT_MAX && actor.name.len() <= TEXT_MAX;
+                require(texts, "text", "at most 256 bytes")?;
+                let shapes = actor.parts.iter().all(|p| p.shape.is_sane());
+                require(shapes, "shape", "finite, no negative size, at most 256 points")
+            }
+            Event::Joined { name: text, .. } | Event::Left { reason: text, .. } | Event::Closing { reason: text } => {
+                require(text.len() <= TEXT_MAX, "text", "at most 256 bytes")
+            }
+            Event::ActorRemoved { .. } => Ok(()),
+        }
+    }
+}
+
+// --- how the server does -------------------------------------------------------------------------------------------
+
+/// Answer on [`status`](crate::Keys::status).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Status {
+    /// Version and commit of the server.
+    pub version: String,
+    /// Name of the arena.
+    pub arena: String,
+    /// Last finished tick.
+    pub tick: u64,
+    /// Ticks a second.
+    pub tick_hz: u16,
+    /// Since the start, s.
+    pub uptime_s: f64,
+    /// Over the last ten seconds, ms.
+    pub tick_p50_ms: f64,
+    /// Over the last ten seconds, ms.
+    pub tick_p99_ms: f64,
+    /// Ticks that took longer than the tick period, since the start.
+    pub overruns: u64,
+    /// Ticks that were left out to catch up, since the start.
+    pub skipped_ticks: u64,
+    /// Sessions now.
+    pub clients: u32,
+    /// Bodies now.
+    pub bodies: u32,
+    /// Unknowns of the last tick.
+    pub dof_awake: u32,
+    /// Contact points of the last tick.
+    pub contacts: u32,
+    /// Bodies whose state became non-finite and were taken out, since the start.
+    pub quarantined: u64,
+    /// Payload sent to clients, over the last ten seconds, bytes/s.
+    pub sent_bytes_per_s: f64,
+    /// Payload received from clients, over the last ten seconds, bytes/s.
+    pub received_bytes_per_s: f64,
+    /// Resident memory, bytes.
+    pub memory_bytes: u64,
+    /// CPU time of the whole process since its start, s.
+    pub cpu_s: f64,
+    /// What was refused, since the start.
+    pub refused: RefusedCounts,
+    /// Hash of the state after [`Status::tick`].
+    pub state_hash: u64,
+}
+
+/// Messages that were dropped or refused, by reason.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RefusedCounts {
+    /// Joins of another protocol version.
+    pub join_version: u64,
+    /// Joins that could not be read.
+    pub join_malformed: u64,
+    /// Joins for which there was no slot.
+    pub join_full: u64,
+    /// Inputs longer than allowed.
+    pub input_too_long: u64,
+    /// Inputs of another protocol version.
+    pub input_version: u64,
+    /// Inputs that could not be read.
+    pub input_malformed: u64,
+    /// Inputs with a value that is out of range or not finite.
+    pub input_content: u64,
+    /// Inputs that are not authentic: wrong key, wrong epoch, or no such session.
+    pub input_forged: u64,
+    /// Inputs with nothing new in them.
+    pub input_stale: u64,
+    /// Inputs dropped because too many came between two ticks.
+    pub input_flood: u64,
+    /// Queries (`status`, `ticks`, `describe`) that could not be read.
+    pub query_malformed: u64,
+}
+
+impl Message for Status {
+    const KIND: u8 = 7;
+    const MAX_BYTES: usize = 2048;
+    fn validate(&self) -> Result<(), WireError> {
+        Ok(())
+    }
+}
+
+/// Query payload on [`ticks`](crate::Keys::ticks).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TicksRequest {
+    /// First tick wanted; the server keeps the last [`TICK_RECORDS_MAX`].
+    pub since: u64,
+}
+
+impl Message for TicksRequest {
+    const KIND: u8 = 8;
+    const MAX_BYTES: usize = 32;
+    fn validate(&self) -> Result<(), WireError> {
+        Ok(())
+    }
+}
+
+/// Most ticks that a server keeps records of.
+pub const TICK_RECORDS_MAX: usize = 4096;
+
+/// Names of the pipeline's five stages, in order: the same in the code, the docs and the metrics.
+pub const STAGE_NAMES: [&str; 5] = ["input", "collision", "logic", "integration", "output"];
+
+/// What one tick cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TickRecord {
+    /// Number of the tick.
+    pub tick: u64,
+    /// From the tick's start to its end, µs.
+    pub wall_us: u32,
+    /// Of [`TickRecord::wall_us`], each stage of [`STAGE_NAMES`], µs.
+    pub stage_us: [u32; 5],
+    /// CPU time of the tick's thread, µs.
+    pub cpu_us: u32,
+    /// Time that the tick's thread was ready and waited for a core, µs.
+    pub wait_us: u32,
+    /// How late the tick began, µs.
+    pub late_us: u32,
+    /// Sessions.
+    pub clients: u16,
+    /// Bodies.
+    pub bodies: u32,
+    /// Unknowns.
+    pub dof_awake: u32,
+    /// Contact points.
+    pub contacts: u32,
+    /// Newton iterations, summed over islands.
+    pub newton_iterations: u32,
+    /// Iterations of the linear solver, summed over islands.
+    pub linear_iterations: u32,
+}
+
+/// Answer to a [`TicksRequest`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TickRecords {
+    /// In order of tick, without gaps unless ticks were skipped.
+    pub records: Vec<TickRecord>,
+}
+
+impl Message for TickRecords {
+    const KIND: u8 = 9;
+    const MAX_BYTES: usize = 128 * TICK_RECORDS_MAX;
+    fn validate(&self) -> Result<(), WireError> {
+        require(self.records.len() <= TICK_RECORDS_MAX, "records", "at most 4096")
+    }
+}
+
+/// `Vec<u8>` as one run of bytes instead of a sequence of numbers.
+mod bytes {
+    use serde::{Deserializer, Serializer, de::Visitor};
+
+    pub fn serialize<S: Serializer>(bytes: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_bytes(bytes)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<u8>, D::Error> {
+        struct Bytes;
+        impl Visitor<'_> for Bytes {
+            type Value = Vec<u8>;
+            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str("bytes")
+            }
+            fn visit_bytes<E>(self, bytes: &[u8]) -> Result<Vec<u8>, E> {
+                Ok(bytes.to_vec())
+            }
+            fn visit_byte_buf<E>(self, bytes: Vec<u8>) -> Result<Vec<u8>, E> {
+                Ok(bytes)
+            }
+        }
+        deserializer.deserialize_byte_buf(Bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{PROTOCOL_VERSION, decode, encode};
+    use proptest::prelude::*;
+
+    fn join(name: &str) -> JoinRequest {
+        JoinRequest { name: name.to_owned(), role: Role::Player }
+    }
+
+    fn packet(throttle: f32) -> InputPacket {
+        let controls = Controls { throttle, ..Controls::default() };
+        let frames = (1..=3).map(|sequence| InputFrame { sequence, tick: 7, controls }).collect();
+        InputPacket { epoch: 1, snapshot_tick: 6, leave: false, frames }
+    }
+
+    #[test]
+    fn messages_round_trip() {
+        assert_eq!(decode(&encode(&join("Wu"))), Ok(join("Wu")));
+        assert_eq!(decode(&encode(&packet(0.5))), Ok(packet(0.5)));
+        let snapshot = Snapshot { tick: 1, ack: InputAck::default(), event_sequence: 2, dof: vec![1, 2, 3] };
+        assert_eq!(decode(&encode(&snapshot)), Ok(snapshot));
+    }
+
+    #[test]
+    fn version_and_kind_come_before_the_body() {
+        let mut other_version = encode(&join("Wu"));
+        other_version[0] = 99;
+        assert_eq!(decode::<JoinRequest>(&other_version), Err(WireError::Version { theirs: 99 }));
+        let other_kind = encode(&TicksRequest { since: 1 });
+        assert_eq!(decode::<JoinRequest>(&other_kind), Err(WireError::Kind { got: 8, expected: 1 }));
+        assert!(PROTOCOL_VERSION < 99);
+    }
+
+    #[test]
+    fn content_is_checked() {
+        for name in ["", "  ", "a\nb", &"x".repeat(33)] {
+            assert!(matches!(decode::<JoinRequest>(&encode(&join(name))), Err(WireError::Content { .. })), "{name:?}");
+        }
+        for throttle in [f32::NAN, f32::INFINITY, -0.1, 1.1] {
+            let refused = decode::<InputPacket>(&encode(&packet(throttle)));
+            assert_eq!(refused, Err(WireError::Content { field: "throttle", allowed: "0 to 1" }));
+        }
+        let mut trailing = encode(&join("Wu"));
+        trailing.push(0);
+        assert_eq!(decode::<JoinRequest>(&trailing), Err(WireError::Malformed));
+        assert!(matches!(decode::<JoinRequest>(&[1; 129]), Err(WireError::TooLong { bytes: 129, max: 128 })));
+    }
+
+    #[test]
+    fn the_largest_input_packet_fits_its_limit() {
+        let frame = InputFrame {
+            sequence: u32::MAX,
+            tick: u64::MAX,
+            controls: Controls { throttle: 1.0, brake: 1.0, steer: 1.0, buttons: u16::MAX },
+        };
+        let frames = (0..8).map(|i| InputFrame { sequence: u32::MAX - 8 + i, ..frame }).collect();
+        let packet = InputPacket { epoch: u32::MAX, snapshot_tick: u64::MAX, leave: true, frames };
+        assert!(encode(&packet).len() <= InputPacket::MAX_BYTES);
+    }
+
+    #[test]
+    fn nine_bytes_cannot_claim_all_memory() {
+        // Version, kind, then the marker and value of a length of 2^63.
+        let mut bomb = vec![1, Snapshot::KIND, 0, 0, 0, 0, 253];
+        bomb.extend_from_slice(&(1u64 << 63).to_le_bytes());
+        assert_eq!(decode::<Snapshot>(&bomb), Err(WireError::Malformed));
+    }
+
+    proptest! {
+        #[test]
+        fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..600), kind in 1u8..10) {
+            let mut framed = vec![PROTOCOL_VERSION as u8, kind];
+            framed.extend(&bytes);
+            let _ = decode::<JoinRequest>(&framed);
+            let _ = decode::<JoinReply>(&framed);
+            let _ = decode::<Description>(&framed);
+            let _ = decode::<InputPacket>(&framed);
+            let _ = decode::<Snapshot>(&framed);
+            let _ = decode::<EventMessage>(&framed);
+            let _ = decode::<Status>(&framed);
+            let _ = decode::<TickRecords>(&framed);
+        }
+    }
+}
