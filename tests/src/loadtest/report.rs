@@ -1,0 +1,279 @@
+//! What the load test says: tables and a verdict for people, one object for machines. Pure.
+
+use pita_protocol::build_info;
+use pita_protocol::message::STAGE_NAMES;
+use serde::Serialize;
+
+use super::figures::{FRAME_60_HZ_MS, TICK_30_HZ_MS, TickFigures};
+use crate::table::table;
+
+/// One step of the ramp.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Step {
+    /// Clients asked for.
+    pub clients: usize,
+    /// What the ticks cost.
+    pub ticks: TickFigures,
+    /// CPU time of the server process over wall time, cores.
+    pub server_cpu_cores: f64,
+    /// Resident memory of the server at the step's end, bytes.
+    pub server_memory_bytes: u64,
+    /// Payload sent, bytes/s a client.
+    pub sent_bytes_per_s_per_client: f64,
+    /// Payload received, bytes/s a client.
+    pub received_bytes_per_s_per_client: f64,
+    /// The bots' side.
+    pub bots: BotFigures,
+    /// The bots were later than [`STARVED_LATENESS_TICKS`](super::STARVED_LATENESS_TICKS): the step tells little about
+    /// more clients than that on cores of their own.
+    pub bots_starved: bool,
+}
+
+/// How the bots of one step did.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct BotFigures {
+    /// CPU time of the bots' process over wall time, cores.
+    pub cpu_cores: f64,
+    /// How late a bot sent its input after it meant to, 99th percentile, ms.
+    pub late_p99_ms: f64,
+    /// From sending an input to the first snapshot that has its effect, median, ms.
+    pub effect_p50_ms: f64,
+    /// The same, 99th percentile, ms.
+    pub effect_p99_ms: f64,
+    /// Snapshots received, all bots together.
+    pub snapshots: u64,
+    /// Snapshots that never came, all bots together.
+    pub missed_snapshots: u64,
+    /// Bots whose session ended before the step did.
+    pub lost: usize,
+}
+
+/// A whole run.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Version and commit of this program.
+    pub version: &'static str,
+    /// Version and commit of the server.
+    pub server_version: String,
+    /// Arena of the server.
+    pub arena: String,
+    /// Ticks a second of the server.
+    pub tick_hz: u16,
+    /// Cores that this machine gives this program.
+    pub cores: usize,
+    /// Cores that the server was pinned to; `None` for a server that ran already.
+    pub server_cores: Option<Vec<usize>>,
+    /// The steps, in the order in which they ran.
+    pub steps: Vec<Step>,
+    /// First number of clients at which the p99 tick time passed 16.7 ms.
+    pub p99_over_16_7_ms_at_clients: Option<usize>,
+    /// First number of clients at which the p99 tick time passed 33.3 ms.
+    pub p99_over_33_3_ms_at_clients: Option<usize>,
+}
+
+impl Report {
+    /// A report of no steps yet.
+    pub fn new(server_version: String, arena: String, tick_hz: u16, server_cores: Option<Vec<usize>>) -> Self {
+        Self {
+            version: build_info::VERSION_AND_COMMIT,
+            server_version,
+            arena,
+            tick_hz,
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            server_cores,
+            steps: Vec::new(),
+            p99_over_16_7_ms_at_clients: None,
+            p99_over_33_3_ms_at_clients: None,
+        }
+    }
+
+    /// Adds the next step.
+    pub fn push(&mut self, step: Step) {
+        self.steps.push(step);
+        self.p99_over_16_7_ms_at_clients = self.first_over(FRAME_60_HZ_MS);
+        self.p99_over_33_3_ms_at_clients = self.first_over(TICK_30_HZ_MS);
+    }
+
+    /// Bots lost in all steps together.
+    pub fn lost(&self) -> usize {
+        self.steps.iter().map(|step| step.bots.lost).sum()
+    }
+
+    /// Tables and verdict.
+    pub fn text(&self) -> String {
+        let mut text = format!(
+            "\nTick time, ms\n{}\n\nStages, p50 / p99 ms, and the tick's thread\n{}\n\nProcesses\n{}\n",
+            self.tick_table(),
+            self.stage_table(),
+            self.process_table()
+        );
+        for (limit_ms, at) in
+            [(FRAME_60_HZ_MS, self.p99_over_16_7_ms_at_clients), (TICK_30_HZ_MS, self.p99_over_33_3_ms_at_clients)]
+        {
+            text += &match at {
+                Some(clients) => format!("p99 first passes {limit_ms:.1} ms at {clients} clients\n"),
+                None => format!("p99 stays within {limit_ms:.1} ms up to {} clients\n", self.clients_max()),
+            };
+        }
+        if self.steps.iter().any(|step| step.bots_starved) {
+            text += "* the bots starved for a core in this step: its figures are those of the shared machine\n";
+        }
+        if self.lost() > 0 {
+            text += &format!("{} clients were lost\n", self.lost());
+        }
+        text
+    }
+
+    fn first_over(&self, limit_ms: f64) -> Option<usize> {
+        self.steps.iter().find(|step| step.ticks.tick.p99_ms > limit_ms).map(|step| step.clients)
+    }
+
+    fn clients_max(&self) -> usize {
+        self.steps.iter().map(|step| step.clients).max().unwrap_or(0)
+    }
+
+    fn tick_table(&self) -> comfy_table::Table {
+        let header = [
+            "clients", "ticks", "bodies", "DOF", "contacts", "p50", "p95", "p99", "max", "late p99", "overruns",
+            "skipped",
+        ];
+        table(
+            &header,
+            self.steps.iter().map(|step| {
+                let ticks = &step.ticks;
+                let mut row = vec![step.marked_clients()];
+                row.extend([ticks.ticks, ticks.bodies as usize, ticks.dof_awake as usize].map(|n| n.to_string()));
+                row.push(ticks.contacts.to_string());
+                row.extend([ticks.tick.p50_ms, ticks.tick.p95_ms, ticks.tick.p99_ms, ticks.tick.max_ms].map(ms));
+                row.extend([ms(ticks.late.p99_ms), ticks.overruns.to_string(), ticks.skipped_ticks.to_string()]);
+                row
+            }),
+        )
+    }
+
+    fn stage_table(&self) -> comfy_table::Table {
+        let mut header = vec!["clients"];
+        header.extend(STAGE_NAMES);
+        header.extend(["CPU", "wait for a core"]);
+        table(
+            &header,
+            self.steps.iter().map(|step| {
+                let thread = [step.ticks.cpu, step.ticks.wait];
+                let cells = step.ticks.stages.iter().map(|stage| stage.wall).chain(thread);
+                let cells = cells.map(|q| format!("{} / {}", ms(q.p50_ms), ms(q.p99_ms)));
+                std::iter::once(step.marked_clients()).chain(cells).collect()
+            }),
+        )
+    }
+
+    fn process_table(&self) -> comfy_table::Table {
+        let header = [
+            "clients",
+            "server CPU %",
+            "server MiB",
+            "sent kB/s a client",
+            "received kB/s a client",
+            "bots CPU %",
+            "bots late p99 ms",
+            "effect p50 / p99 ms",
+            "missed snapshots",
+            "lost",
+        ];
+        table(
+            &header,
+            self.steps.iter().map(|step| {
+                let bots = &step.bots;
+                vec![
+                    step.marked_clients(),
+                    format!("{:.0}", 100.0 * step.server_cpu_cores),
+                    format!("{:.0}", step.server_memory_bytes as f64 / f64::from(1 << 20)),
+                    format!("{:.1}", step.sent_bytes_per_s_per_client / 1000.0),
+                    format!("{:.1}", step.received_bytes_per_s_per_client / 1000.0),
+                    format!("{:.0}", 100.0 * bots.cpu_cores),
+                    ms(bots.late_p99_ms),
+                    format!("{} / {}", ms(bots.effect_p50_ms), ms(bots.effect_p99_ms)),
+                    format!("{} of {}", bots.missed_snapshots, bots.snapshots + bots.missed_snapshots),
+                    bots.lost.to_string(),
+                ]
+            }),
+        )
+    }
+}
+
+impl Step {
+    fn marked_clients(&self) -> String {
+        format!("{}{}", self.clients, if self.bots_starved { "*" } else { "" })
+    }
+}
+
+/// Milliseconds with three significant digits.
+fn ms(value: f64) -> String {
+    let decimals = if value < 10.0 { 2 } else { 1 };
+    format!("{value:.decimals$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use pita_protocol::message::TickRecord;
+
+    use super::super::{figures::Quantiles, plot};
+    use super::*;
+
+    fn step(clients: usize, p99_ms: f64) -> Step {
+        let tick = Quantiles { p50_ms: p99_ms / 2.0, p95_ms: p99_ms, p99_ms, max_ms: 2.0 * p99_ms };
+        Step { clients, ticks: TickFigures { ticks: 1000, tick, ..Default::default() }, ..Default::default() }
+    }
+
+    fn report(steps: impl IntoIterator<Item = Step>) -> Report {
+        let mut report = Report::new("0.1.0 (abc)".into(), "proving-ground".into(), 30, Some(vec![0, 1]));
+        steps.into_iter().for_each(|step| report.push(step));
+        report
+    }
+
+    #[test]
+    fn the_verdict_names_the_first_count_over_each_limit() {
+        let report = report([step(8, 9.0), step(16, 17.0), step(32, 16.0), step(64, 20.0)]);
+        assert_eq!(report.p99_over_16_7_ms_at_clients, Some(16));
+        assert_eq!(report.p99_over_33_3_ms_at_clients, None);
+        let text = report.text();
+        assert!(text.contains("p99 first passes 16.7 ms at 16 clients"), "{text}");
+        assert!(text.contains("p99 stays within 33.3 ms up to 64 clients"), "{text}");
+        assert!(!text.contains("starved") && !text.contains("lost\n"), "{text}");
+    }
+
+    #[test]
+    fn starved_steps_are_marked_and_lost_clients_counted() {
+        let starved = Step { bots_starved: true, ..step(32, 9.0) };
+        let lossy = Step { bots: BotFigures { lost: 3, ..Default::default() }, ..step(64, 9.0) };
+        let report = report([starved, lossy]);
+        assert_eq!(report.lost(), 3);
+        let text = report.text();
+        assert!(
+            text.contains("32*") && text.contains("bots starved") && text.contains("3 clients were lost"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn json_has_units_in_its_keys() {
+        let ticks = TickFigures::of(&[TickRecord { wall_us: 1500, ..Default::default() }], 30);
+        let json = serde_json::to_value(report([Step { clients: 4, ticks, ..Default::default() }])).unwrap();
+        let step = &json["steps"][0];
+        assert_eq!(step["clients"], 4);
+        assert_eq!(step["ticks"]["tick"]["p99_ms"], 1.5);
+        assert_eq!(step["ticks"]["stages"][3]["name"], "integration");
+        assert!(step["ticks"]["stages"][3]["p50_ms"].is_number());
+    }
+
+    #[test]
+    fn the_plot_has_both_limits_and_every_step() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("plot.svg");
+        let starved = Step { bots_starved: true, ..step(64, 50.0) };
+        plot::draw(&[step(1, 2.0), step(16, 17.0), starved], "Tick time", &path).unwrap();
+        let svg = std::fs::read_to_string(&path).unwrap();
+        assert!(svg.contains("16.7 ms") && svg.contains("33.3 ms") && svg.contains("bots starved"));
+        assert_eq!(svg.matches("<circle").count(), 6);
+        plot::draw(&[], "nothing", &path).unwrap();
+    }
+}
