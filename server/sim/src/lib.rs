@@ -1,1 +1,39 @@
-//! Skeleton.
+//! PITA's engine: degrees of freedom, potentials, implicit Euler, collision.
+//!
+//! The whole world is one vector of degrees of freedom Q and its rate Q'. Everything that pushes is a potential. A
+//! tick finds the Q' at its end for which the residual
+//!
+//! ```text
+//! R(Q1') = M1 Q1' − M0 Q0' − F(Q1, Q1') dt
+//! ```
+//!
+//! is zero and moves every DOF there: Q1 = Q0 + Q1' dt (the talk's axioms 2 to 4).
+//!
+//! Owns: the state ([`World`]), DOF kinds ([`dof`]), potentials ([`potential`]), the integrator ([`integrate`]),
+//! collision detection ([`collide`]). It is pure: no clock, no I/O, no randomness, no wire types; the same calls in the
+//! same order give the same bits, whatever the number of threads.
+//!
+//! Conventions: SI units, f64, right-handed, y up; quaternions turn body axes into world axes; angular velocities are in
+//! world axes; a half-space's normal points out of the ground.
+
+pub mod collide;
+pub mod dof;
+mod error;
+pub mod integrate;
+mod island;
+pub mod potential;
+mod settings;
+mod state;
+mod world;
+
+pub use collide::{Collider, ContactView, Shape, StaticDesc, StaticId};
+pub use dof::{BodyId, DofKind, ParticleDesc, RigidBodyDesc};
+pub use error::SimError;
+pub use glam::{DMat3, DQuat, DVec3};
+pub use integrate::StepReport;
+pub use potential::{
+    Anchor, AxleControl, AxleDesc, AxleId, BallJointDesc, BallJointId, Motor, PdControl, PdDesc, PdId, SpringDesc,
+    SpringId,
+};
+pub use settings::{ContactSettings, Settings, SolverSettings};
+pub use world::{Energy, Momentum, SliceView, World};

@@ -1,0 +1,197 @@
+//! Collision detection: which DOF are incompatible, and where.
+//!
+//! Once a tick, at Q0, with margins that cover the tick's motion: [`broad_phase`] prunes, [`narrow_phase`] finds the
+//! points. What comes out are contact points; [`potential::contact`](crate::potential) makes potentials of them.
+
+mod broad_phase;
+mod half_space;
+mod manifold;
+mod narrow_phase;
+mod shape;
+
+use glam::{DQuat, DVec3};
+
+pub use shape::{Collider, HULL_POINTS_MAX, Shape};
+
+use crate::dof::{BodyId, Pose, Twist};
+use crate::error::{SimError, require_rotation, require_vector};
+use crate::settings::Settings;
+use broad_phase::{Bounds, BroadPhase};
+use narrow_phase::NarrowPhase;
+
+slotmap::new_key_type! {
+    /// Handle of a piece of static geometry.
+    pub struct StaticId;
+}
+
+/// A piece of static geometry to be added.
+#[derive(Clone, Debug)]
+pub struct StaticDesc {
+    /// Its shape.
+    pub shape: Shape,
+    /// Where it stands, m.
+    pub position: DVec3,
+    /// Shape to world.
+    pub rotation: DQuat,
+    /// Coulomb friction coefficient.
+    pub friction: f64,
+}
+
+/// A contact point of the last tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactView {
+    /// First body.
+    pub a: BodyId,
+    /// Second body; `None` for static geometry.
+    pub b: Option<BodyId>,
+    /// Half way between the surfaces, m.
+    pub point: DVec3,
+    /// Unit vector from `a` to `b`.
+    pub normal: DVec3,
+    /// Distance of the surfaces when it was found, m; negative where they overlap.
+    pub gap: f64,
+    /// At the end of the tick, N.
+    pub normal_force: f64,
+}
+
+/// What detection sees of a body.
+#[derive(Clone, Copy)]
+pub(crate) struct Moving<'a> {
+    pub serial: u32,
+    pub collider: &'a Collider,
+    pub pose: Pose,
+    pub twist: Twist,
+}
+
+/// The second half of a pair: another body or a piece of static geometry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Partner {
+    Body(u32),
+    Static(u32),
+}
+
+/// A contact point as it was found at Q0.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ContactPoint {
+    /// Serial of the first body.
+    pub a: u32,
+    pub b: Partner,
+    /// Half way between the surfaces, m.
+    pub position: DVec3,
+    /// From `a` to `b`.
+    pub normal: DVec3,
+    pub gap: f64,
+    /// Coulomb coefficient of the pair.
+    pub friction: f64,
+    /// Tangential slip of `b` against `a` that the friction spring remembers, m.
+    pub anchor: DVec3,
+    /// At the end of the last tick that had this point, N.
+    pub normal_force: f64,
+    feature: u32,
+}
+
+struct Static {
+    serial: u32,
+    collider: Collider,
+    pose: Pose,
+    bounds: Bounds,
+}
+
+/// The collision stage.
+#[derive(Default)]
+pub(crate) struct Detector {
+    statics: slotmap::SlotMap<StaticId, Static>,
+    static_serials: u32,
+    /// Pairs of bodies that never collide, by serial, smaller first; sorted.
+    excluded: Vec<(u32, u32)>,
+    broad_phase: BroadPhase,
+    narrow_phase: NarrowPhase,
+    bounds: Vec<Bounds>,
+    pairs: Vec<(u32, u32)>,
+    /// Contacts of this tick, in order of pair.
+    pub contacts: Vec<ContactPoint>,
+}
+
+impl Detector {
+    pub fn add_static(&mut self, desc: StaticDesc) -> Result<StaticId, SimError> {
+        require_vector(desc.position, "position")?;
+        require_rotation(desc.rotation, "rotation")?;
+        let collider = Collider::new(desc.shape, desc.friction);
+        collider.validate()?;
+        let pose = Pose { position: desc.position, rotation: desc.rotation.normalize() };
+        let half = collider.shape().half_extents(pose.rotation);
+        let bounds = Bounds { min: pose.position - half, max: pose.position + half };
+        let serial = self.static_serials;
+        self.static_serials += 1;
+        Ok(self.statics.insert(Static { serial, collider, pose, bounds }))
+    }
+
+    pub fn remove_static(&mut self, id: StaticId) -> bool {
+        self.statics.remove(id).is_some()
+    }
+
+    /// The two bodies never collide with each other.
+    pub fn exclude(&mut self, a: u32, b: u32) {
+        let pair = (a.min(b), a.max(b));
+        if let Err(place) = self.excluded.binary_search(&pair) {
+            self.excluded.insert(place, pair);
+        }
+    }
+
+    /// Forgets a body: its contacts and exclusions.
+    pub fn forget(&mut self, serial: u32) {
+        self.excluded.retain(|&(a, b)| a != serial && b != serial);
+        self.forget_contacts(serial);
+    }
+
+    /// Forgets a body's contacts.
+    pub fn forget_contacts(&mut self, serial: u32) {
+        self.contacts.retain(|c| c.a != serial && c.b != Partner::Body(serial));
+        self.narrow_phase.forget(serial);
+    }
+
+    /// Finds all contact points of `bodies`, which are in order of serial. `look` answers `None` for what does not
+    /// collide.
+    pub fn detect<'a>(&mut self, bodies: &[BodyId], settings: &Settings, look: impl Fn(BodyId) -> Option<Moving<'a>>) {
+        self.bounds.clear();
+        let bounds = |&id: &BodyId| look(id).map_or(Bounds::EMPTY, |body| swept_bounds(&body, settings));
+        self.bounds.extend(bodies.iter().map(bounds));
+        self.broad_phase.pairs(&self.bounds, &mut self.pairs);
+        self.narrow_phase.begin();
+        let mut pairs = self.pairs.iter().peekable();
+        for (i, &id) in (0..).zip(bodies) {
+            let Some(body) = &look(id) else { continue };
+            while let Some(&(_, j)) = pairs.next_if(|&&(a, _)| a == i) {
+                let Some(other) = &look(bodies[j as usize]) else { continue };
+                if self.excluded.binary_search(&(body.serial, other.serial)).is_err() {
+                    self.narrow_phase.bodies(body, other, settings);
+                }
+            }
+            for piece in self.statics.values() {
+                if piece.bounds.overlaps(&self.bounds[i as usize]) {
+                    self.narrow_phase.with_static(body, piece.serial, &piece.collider, piece.pose, settings);
+                }
+            }
+        }
+        self.contacts.clear();
+        self.narrow_phase.finish(&mut self.contacts);
+    }
+
+    /// Remembers what the friction springs and normal forces of `contacts` became.
+    pub fn remember(&mut self) {
+        self.narrow_phase.remember(&self.contacts);
+    }
+}
+
+/// Bounds of a body and of all that a tick may do to it.
+fn swept_bounds(body: &Moving, settings: &Settings) -> Bounds {
+    let half = body.collider.shape().half_extents(body.pose.rotation);
+    let sweep = settings.dt * body.twist.linear;
+    let slack = settings.contact.margin + settings.dt * settings.dt * settings.gravity.length();
+    // Turning moves no point of the body farther than its bounding ball reaches beyond its present box.
+    let turn = settings.dt * body.twist.angular.length() * body.collider.bounding_radius();
+    let turn = DVec3::splat(turn).min(DVec3::splat(body.collider.bounding_radius()) - half).max(DVec3::ZERO);
+    let reach = half + turn + slack;
+    let ends = [body.pose.position, body.pose.position + sweep];
+    Bounds { min: ends[0].min(ends[1]) - reach, max: ends[0].max(ends[1]) + reach }
+}

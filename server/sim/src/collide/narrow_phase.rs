@@ -1,0 +1,209 @@
+//! Fine detection: contact points of pairs that may touch, found again from tick to tick.
+//!
+//! Half-spaces are ours, in closed form; everything else is parry's (GJK on support maps with border radius, EPA for
+//! what overlaps, feature clipping for the manifold).
+
+use arrayvec::ArrayVec;
+use glam::DVec3;
+use parry3d_f64::math::Pose as ParryPose;
+use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
+use parry3d_f64::shape::PackedFeatureId;
+
+use super::half_space;
+use super::manifold::{Manifold, ManifoldPoint, POINTS_MAX};
+use super::shape::{Collider, Shape};
+use super::{ContactPoint, Moving, Partner};
+use crate::dof::Pose;
+use crate::settings::Settings;
+
+/// A point without a name of its own is found again where it lies within this of its place last tick, m.
+const SAME_POINT: f64 = 0.02;
+
+/// Name of a point whose features parry does not know.
+const NAMELESS: u32 = u32::MAX;
+
+/// What is kept of a pair from tick to tick.
+struct Pair {
+    a: u32,
+    b: Partner,
+    points: ArrayVec<ContactPoint, POINTS_MAX>,
+    /// Parry's own memory of the pair: the last separating direction.
+    parry: ContactManifold<(), ()>,
+}
+
+impl Pair {
+    fn key(&self) -> (u32, Partner) {
+        (self.a, self.b)
+    }
+}
+
+/// The fine phase and its memory.
+#[derive(Default)]
+pub(super) struct NarrowPhase {
+    /// Pairs of the last tick, sorted by key.
+    last: Vec<Pair>,
+    /// Pairs of this tick, in the order in which they were asked for.
+    pairs: Vec<Pair>,
+    /// Pairs that ended; their memory is used again.
+    spare: Vec<Pair>,
+    manifold: Manifold,
+}
+
+impl NarrowPhase {
+    /// Starts a tick.
+    pub fn begin(&mut self) {
+        std::mem::swap(&mut self.last, &mut self.pairs);
+        self.spare.append(&mut self.pairs);
+    }
+
+    /// Contacts of two bodies.
+    pub fn bodies(&mut self, a: &Moving, b: &Moving, settings: &Settings) {
+        let closing = (a.twist.linear - b.twist.linear).length() + spin_speed(a) + spin_speed(b);
+        let margin = margin(closing, settings);
+        self.manifold.clear();
+        let pair = self.take(a.serial, Partner::Body(b.serial));
+        self.parry(pair, (a.collider, a.pose), (b.collider, b.pose), margin);
+        self.update(pair, friction(a.collider, b.collider));
+    }
+
+    /// Contacts of a body with a piece of static geometry.
+    pub fn with_static(&mut self, a: &Moving, serial: u32, piece: &Collider, pose: Pose, settings: &Settings) {
+        let margin = margin(a.twist.linear.length() + spin_speed(a), settings);
+        self.manifold.clear();
+        if let Shape::HalfSpace { normal } = piece.shape() {
+            let normal = pose.rotation * *normal;
+            if (a.pose.position - pose.position).dot(normal) > a.collider.bounding_radius() + margin {
+                return;
+            }
+            half_space::contacts(a.collider.shape(), a.pose, pose.position, normal, margin, &mut self.manifold);
+            if self.manifold.reduced().is_empty() {
+                return;
+            }
+            let pair = self.take(a.serial, Partner::Static(serial));
+            self.update(pair, friction(a.collider, piece));
+            return;
+        }
+        let pair = self.take(a.serial, Partner::Static(serial));
+        self.parry(pair, (a.collider, a.pose), (piece, pose), margin);
+        self.update(pair, friction(a.collider, piece));
+    }
+
+    /// Ends a tick: writes all points, sorted by pair.
+    pub fn finish(&mut self, contacts: &mut Vec<ContactPoint>) {
+        self.spare.append(&mut self.last);
+        self.pairs.sort_unstable_by_key(Pair::key);
+        for pair in &self.pairs {
+            contacts.extend_from_slice(&pair.points);
+        }
+    }
+
+    /// Takes over what the solver did to the points that [`NarrowPhase::finish`] wrote, in the same order.
+    pub fn remember(&mut self, contacts: &[ContactPoint]) {
+        for (mine, theirs) in self.pairs.iter_mut().flat_map(|pair| &mut pair.points).zip(contacts) {
+            *mine = *theirs;
+        }
+    }
+
+    /// Drops every pair of a body.
+    pub fn forget(&mut self, serial: u32) {
+        let gone = |pair: &Pair| pair.a == serial || pair.b == Partner::Body(serial);
+        let mut i = 0;
+        while i < self.pairs.len() {
+            if gone(&self.pairs[i]) {
+                self.spare.push(self.pairs.remove(i));
+            } else {
+                i += 1;
+            }
+        }
+    }
+
+    /// Index in `pairs` of a pair, moved there from the last tick where it has been one.
+    fn take(&mut self, a: u32, b: Partner) -> usize {
+        let known = self.last.binary_search_by_key(&(a, b), Pair::key);
+        let mut pair =
+            self.spare.pop().unwrap_or_else(|| Pair { a, b, points: ArrayVec::new(), parry: ContactManifold::new() });
+        (pair.a, pair.b) = (a, b);
+        pair.points.clear();
+        pair.parry.clear();
+        if let Ok(i) = known {
+            std::mem::swap(&mut pair.points, &mut self.last[i].points);
+            std::mem::swap(&mut pair.parry, &mut self.last[i].parry);
+        }
+        self.pairs.push(pair);
+        self.pairs.len() - 1
+    }
+
+    /// Asks parry for the manifold of two convex shapes.
+    fn parry(&mut self, pair: usize, a: (&Collider, Pose), b: (&Collider, Pose), margin: f64) {
+        let (Some((shape_a, pose_a)), Some((shape_b, pose_b))) = (a.0.placed(a.1), b.0.placed(b.1)) else {
+            return;
+        };
+        let manifold = &mut self.pairs[pair].parry;
+        let relative: ParryPose = pose_a.inv_mul(&pose_b);
+        // Parry clones the old points to carry its own data over; we have our own, and an empty clone is free.
+        manifold.points.clear();
+        let (shape_a, shape_b) = (&*shape_a.0, &*shape_b.0);
+        let dispatcher = DefaultQueryDispatcher;
+        if dispatcher.contact_manifold_convex_convex(&relative, shape_a, shape_b, None, None, margin, manifold).is_err()
+        {
+            return;
+        }
+        self.manifold.normal = pose_a.rotation * manifold.local_n1;
+        for point in manifold.points.iter().filter(|p| p.dist < margin) {
+            let on_a = pose_a * point.local_p1;
+            let on_b = pose_b * point.local_p2;
+            let feature = name(point.fid1, point.fid2);
+            self.manifold.offer(ManifoldPoint { position: (on_a + on_b) / 2.0, gap: point.dist, feature });
+        }
+    }
+
+    /// Makes contact points of the manifold's points, with the memory of those that were there last tick.
+    fn update(&mut self, pair: usize, friction: f64) {
+        let pair = &mut self.pairs[pair];
+        let mut old = std::mem::take(&mut pair.points);
+        let single = self.manifold.reduced().len() == 1 && old.len() == 1;
+        let normal = self.manifold.normal;
+        for point in self.manifold.reduced() {
+            let known = old.iter().position(|o| {
+                let named = o.feature == point.feature && point.feature != NAMELESS;
+                let near = (o.position - point.position).length() < SAME_POINT;
+                single || named || (near && (o.feature == NAMELESS || point.feature == NAMELESS))
+            });
+            let (anchor, normal_force) = known.map_or((DVec3::ZERO, 0.0), |i| {
+                let memory = old.swap_remove(i);
+                (memory.anchor - normal * normal.dot(memory.anchor), memory.normal_force)
+            });
+            let ManifoldPoint { position, gap, feature } = *point;
+            let (a, b) = (pair.a, pair.b);
+            pair.points.push(ContactPoint { a, b, position, normal, gap, friction, anchor, normal_force, feature });
+        }
+    }
+}
+
+fn margin(closing_speed: f64, settings: &Settings) -> f64 {
+    settings.contact.margin + settings.dt * (closing_speed + settings.dt * settings.gravity.length())
+}
+
+fn spin_speed(body: &Moving) -> f64 {
+    // A surface of revolution stays where it is however fast it spins about its axis.
+    let spin = body.twist.angular;
+    let across = match body.collider.shape() {
+        Shape::Ball { .. } => DVec3::ZERO,
+        Shape::Cylinder { .. } => spin.reject_from_normalized(body.pose.rotation * DVec3::Z),
+        Shape::Capsule { .. } => spin.reject_from_normalized(body.pose.rotation * DVec3::X),
+        _ => spin,
+    };
+    across.length() * body.collider.bounding_radius()
+}
+
+fn friction(a: &Collider, b: &Collider) -> f64 {
+    (a.friction() * b.friction()).sqrt()
+}
+
+fn name(a: PackedFeatureId, b: PackedFeatureId) -> u32 {
+    if a == PackedFeatureId::UNKNOWN || b == PackedFeatureId::UNKNOWN {
+        return NAMELESS;
+    }
+    // 28 bits of feature and two of kind each; folding keeps them apart well enough within one pair.
+    a.0.rotate_left(16) ^ b.0
+}

@@ -1,0 +1,270 @@
+//! Shapes: convex cores, spherically extruded (the talk's "points become spheres, edges become cylinders").
+
+use std::f64::consts::FRAC_PI_2;
+
+use glam::{DQuat, DVec3};
+use parry3d_f64::math::Pose as ParryPose;
+use parry3d_f64::shape::SharedShape;
+
+use crate::error::{SimError, require, require_vector};
+
+/// A collision shape in its body's frame, metres.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// Everything below the plane through the origin; static only.
+    HalfSpace {
+        /// Unit normal, points out of the ground.
+        normal: DVec3,
+    },
+    /// Ball around the origin: an extruded point.
+    Ball {
+        /// Radius.
+        radius: f64,
+    },
+    /// Box around the origin.
+    Box {
+        /// Half extents.
+        half: DVec3,
+    },
+    /// Segment along x, extruded.
+    Capsule {
+        /// Half length of the segment.
+        half_length: f64,
+        /// Radius.
+        radius: f64,
+    },
+    /// Cylinder along z with rounded edges: a wheel.
+    Cylinder {
+        /// Half length along z, the rounding included.
+        half_length: f64,
+        /// Radius, the rounding included.
+        radius: f64,
+        /// Extrusion radius of the edges; less than the other two.
+        rounding: f64,
+    },
+    /// Convex hull of points, extruded.
+    Hull {
+        /// At least four points that do not lie in a plane, at most 256.
+        points: Vec<DVec3>,
+        /// Extrusion radius.
+        radius: f64,
+    },
+}
+
+/// Most vertices of a hull.
+pub const HULL_POINTS_MAX: usize = 256;
+
+impl Shape {
+    /// # Errors
+    /// [`SimError`] naming the first size that is out of range.
+    pub fn validate(&self) -> Result<(), SimError> {
+        let size = |value: f64, what| require(value > 0.0 && value < 1e6, what, value, "above 0, below 1e6 m");
+        match self {
+            Self::HalfSpace { normal } => {
+                let length = normal.length();
+                require((length - 1.0).abs() < 1e-6, "normal", length, "a vector of length 1")
+            }
+            Self::Ball { radius } => size(*radius, "radius"),
+            Self::Box { half } => half.to_array().into_iter().try_for_each(|h| size(h, "half")),
+            Self::Capsule { half_length, radius } => {
+                size(*half_length, "half_length")?;
+                size(*radius, "radius")
+            }
+            Self::Cylinder { half_length, radius, rounding } => {
+                size(*half_length, "half_length")?;
+                size(*radius, "radius")?;
+                let fits = *rounding >= 0.0 && *rounding < half_length.min(*radius);
+                require(fits, "rounding", *rounding, "0 to below half_length and radius")
+            }
+            Self::Hull { points, radius } => {
+                let count = points.len();
+                require((4..=HULL_POINTS_MAX).contains(&count), "points", count as f64, "4 to 256")?;
+                points.iter().try_for_each(|&p| require_vector(p, "points"))?;
+                require((0.0..1e6).contains(radius), "radius", *radius, "0 to below 1e6 m")?;
+                spans_a_volume(points)
+            }
+        }
+    }
+
+    /// Principal moments of inertia of the homogeneous solid of `mass` kg, kg m². The extrusion of a hull is left out.
+    ///
+    /// A half-space has none: zero. Hulls answer the moments about their own axes, products of inertia neglected.
+    pub fn inertia(&self, mass: f64) -> DVec3 {
+        match *self {
+            Self::HalfSpace { .. } => DVec3::ZERO,
+            Self::Ball { radius } => DVec3::splat(0.4 * mass * radius * radius),
+            Self::Box { half } => {
+                let s = half * half * (mass / 3.0);
+                DVec3::new(s.y + s.z, s.x + s.z, s.x + s.y)
+            }
+            Self::Capsule { half_length: h, radius: r } => {
+                // A cylinder of length 2h and two half balls, by volume.
+                let ball = mass * (4.0 / 3.0 * r) / (2.0 * h + 4.0 / 3.0 * r);
+                let rod = mass - ball;
+                let along = rod * r * r / 2.0 + ball * 0.4 * r * r;
+                let across = rod * (r * r / 4.0 + h * h / 3.0) + ball * (0.4 * r * r + h * h + 0.75 * r * h);
+                DVec3::new(along, across, across)
+            }
+            Self::Cylinder { half_length: h, radius: r, .. } => {
+                let across = mass * (r * r / 4.0 + h * h / 3.0);
+                DVec3::new(across, across, mass * r * r / 2.0)
+            }
+            Self::Hull { .. } => self.parry().map_or(DVec3::ZERO, |hull| {
+                let unit = hull.mass_properties(1.0);
+                let tensor = unit.reconstruct_inertia_matrix() * (mass * unit.inv_mass);
+                DVec3::new(tensor.x_axis.x, tensor.y_axis.y, tensor.z_axis.z)
+            }),
+        }
+    }
+
+    /// Radius of the ball around the body's origin that contains the shape; infinite for a half-space.
+    pub(crate) fn bounding_radius(&self) -> f64 {
+        match self {
+            Self::HalfSpace { .. } => f64::INFINITY,
+            Self::Ball { radius } => *radius,
+            Self::Box { half } => half.length(),
+            Self::Capsule { half_length, radius } => half_length + radius,
+            Self::Cylinder { half_length, radius, .. } => half_length.hypot(*radius),
+            Self::Hull { points, radius } => points.iter().map(|p| p.length()).fold(0.0, f64::max) + radius,
+        }
+    }
+
+    /// Half extents of the world-axis box around the turned shape, centred on the body.
+    pub(crate) fn half_extents(&self, rotation: DQuat) -> DVec3 {
+        let axes = glam::DMat3::from_quat(rotation);
+        match self {
+            Self::HalfSpace { .. } => DVec3::splat(f64::INFINITY),
+            Self::Ball { radius } => DVec3::splat(*radius),
+            Self::Box { half } => axes.x_axis.abs() * half.x + axes.y_axis.abs() * half.y + axes.z_axis.abs() * half.z,
+            Self::Capsule { half_length, radius } => axes.x_axis.abs() * *half_length + *radius,
+            Self::Cylinder { half_length, radius, .. } => {
+                let along = axes.z_axis;
+                let across = (DVec3::ONE - along * along).max(DVec3::ZERO);
+                along.abs() * *half_length + DVec3::new(across.x.sqrt(), across.y.sqrt(), across.z.sqrt()) * *radius
+            }
+            Self::Hull { points, radius } => {
+                points.iter().fold(DVec3::ZERO, |box_, &p| box_.max((axes * p).abs())) + *radius
+            }
+        }
+    }
+
+    /// The same shape as parry knows it. Parry's cylinders stand along y: see [`Shape::parry_rotation`].
+    fn parry(&self) -> Result<SharedShape, SimError> {
+        let flat = SimError::Unusable { what: FLAT_HULL };
+        Ok(match self {
+            Self::HalfSpace { normal } => SharedShape::halfspace(*normal),
+            Self::Ball { radius } => SharedShape::ball(*radius),
+            Self::Box { half } => SharedShape::cuboid(half.x, half.y, half.z),
+            Self::Capsule { half_length, radius } => SharedShape::capsule_x(*half_length, *radius),
+            Self::Cylinder { half_length, radius, rounding } => {
+                SharedShape::round_cylinder(half_length - rounding, radius - rounding, *rounding)
+            }
+            Self::Hull { points, radius } if *radius > 0.0 => {
+                SharedShape::round_convex_hull(points, *radius).ok_or(flat)?
+            }
+            Self::Hull { points, .. } => SharedShape::convex_hull(points).ok_or(flat)?,
+        })
+    }
+
+    /// Turns parry's axes of the shape into the body's.
+    fn parry_rotation(&self) -> DQuat {
+        match self {
+            Self::Cylinder { .. } => DQuat::from_rotation_x(FRAC_PI_2),
+            _ => DQuat::IDENTITY,
+        }
+    }
+}
+
+const FLAT_HULL: &str = "points of a hull lie in a plane";
+
+/// A hull is flat where its height is less than this fraction of its length.
+const FLATTEST: f64 = 1e-6;
+
+/// `Err` where all points lie in a plane, within [`FLATTEST`].
+fn spans_a_volume(points: &[DVec3]) -> Result<(), SimError> {
+    let origin = points[0];
+    let farthest = |height: &dyn Fn(DVec3) -> DVec3| {
+        let heights = points.iter().map(|&p| height(p - origin));
+        heights.fold(DVec3::ZERO, |best, h| if h.length_squared() > best.length_squared() { h } else { best })
+    };
+    let line = farthest(&|p| p);
+    let along = line.normalize_or_zero();
+    let across = farthest(&|p| p.reject_from_normalized(along));
+    let normal = along.cross(across.normalize_or_zero());
+    let height = farthest(&|p| normal * normal.dot(p));
+    let flat = height.length() <= FLATTEST * line.length() || along == DVec3::ZERO;
+    if flat { Err(SimError::Unusable { what: FLAT_HULL }) } else { Ok(()) }
+}
+
+/// What a body or a static piece collides with.
+#[derive(Clone, Debug)]
+pub struct Collider {
+    shape: Shape,
+    friction: f64,
+    /// The shape for the fine phase, with its rotation into the body's frame. Built once: hulls are costly.
+    parry: Option<(SharedShape, DQuat)>,
+    bounding_radius: f64,
+}
+
+impl Collider {
+    /// A collider with a Coulomb friction coefficient; a pair's is the geometric mean of both.
+    pub fn new(shape: Shape, friction: f64) -> Self {
+        // What does not validate is never handed to parry.
+        let parry = shape.validate().and_then(|()| shape.parry()).ok().map(|parry| (parry, shape.parry_rotation()));
+        let bounding_radius = shape.bounding_radius();
+        Self { shape, friction, parry, bounding_radius }
+    }
+
+    /// Its shape.
+    pub fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    /// Its friction coefficient.
+    pub fn friction(&self) -> f64 {
+        self.friction
+    }
+
+    pub(crate) fn bounding_radius(&self) -> f64 {
+        self.bounding_radius
+    }
+
+    /// # Errors
+    /// [`SimError`] naming the first value that is out of range.
+    pub fn validate(&self) -> Result<(), SimError> {
+        require((0.0..=10.0).contains(&self.friction), "friction", self.friction, "0 to 10")?;
+        self.shape.validate()
+    }
+
+    /// Shape for the fine phase and its pose, given the body's.
+    pub(crate) fn placed(&self, pose: crate::dof::Pose) -> Option<(&SharedShape, ParryPose)> {
+        let (shape, rotation) = self.parry.as_ref()?;
+        Some((shape, ParryPose::from_parts(pose.position, pose.rotation * *rotation)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inertia_of_a_hull_agrees_with_the_box_it_is() {
+        let half = DVec3::new(0.2, 0.5, 1.1);
+        let corner = |i: usize| {
+            let sign = |bit: usize| if i & bit == 0 { -1.0 } else { 1.0 };
+            half * DVec3::new(sign(1), sign(2), sign(4))
+        };
+        let hull = Shape::Hull { points: (0..8).map(corner).collect(), radius: 0.0 };
+        let (a, b) = (hull.inertia(3.0), Shape::Box { half }.inertia(3.0));
+        assert!((a - b).length() < 1e-9, "{a} {b}");
+    }
+
+    #[test]
+    fn sizes_out_of_range_are_named() {
+        let bad = Shape::Cylinder { half_length: 0.1, radius: 0.3, rounding: 0.1 };
+        assert!(bad.validate().unwrap_err().to_string().contains("rounding is 0.1"));
+        let flat = Shape::Hull { points: vec![DVec3::ZERO, DVec3::X, DVec3::Z, DVec3::X + DVec3::Z], radius: 0.0 };
+        assert!(flat.validate().is_err());
+        assert!(Shape::Ball { radius: f64::NAN }.validate().is_err());
+    }
+}

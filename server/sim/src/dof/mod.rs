@@ -1,0 +1,244 @@
+//! DOF kinds: what a slice of Q means.
+//!
+//! A kind is Kinematics (how the slice moves over a tick), Inertia (its mass as the integrator sees it) and Potentials
+//! (what pushes it; those live in [`potential`](crate::potential)). One file a kind.
+
+pub(crate) mod particle;
+pub(crate) mod rigid_body;
+
+use glam::{DMat3, DQuat, DVec3};
+
+use crate::collide::Collider;
+use crate::error::{SimError, require, require_rotation, require_vector};
+use crate::state::{Slice, State};
+
+slotmap::new_key_type! {
+    /// Handle of a body; goes stale when the body is removed.
+    pub struct BodyId;
+}
+
+/// Kinds of DOF.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DofKind {
+    /// Q = position; 3 linear, 0 angular.
+    Particle,
+    /// Q = centre of mass and unit quaternion x y z w; Q' = velocity and angular velocity.
+    RigidBody,
+}
+
+/// A rigid body to be added.
+#[derive(Clone, Debug)]
+pub struct RigidBodyDesc {
+    /// Centre of mass, m.
+    pub position: DVec3,
+    /// Principal axes to world.
+    pub rotation: DQuat,
+    /// Of the centre of mass, m/s.
+    pub velocity: DVec3,
+    /// In world axes, rad/s.
+    pub angular_velocity: DVec3,
+    /// kg, above 0.
+    pub mass: f64,
+    /// Principal moments of inertia, kg m², above 0.
+    pub inertia: DVec3,
+    /// What it collides with; `None` passes through everything.
+    pub collider: Option<Collider>,
+}
+
+impl RigidBodyDesc {
+    /// A body at rest without a collider.
+    pub fn new(position: DVec3, mass: f64, inertia: DVec3) -> Self {
+        let (rotation, rest) = (DQuat::IDENTITY, DVec3::ZERO);
+        Self { position, rotation, velocity: rest, angular_velocity: rest, mass, inertia, collider: None }
+    }
+}
+
+/// A particle to be added.
+#[derive(Clone, Debug)]
+pub struct ParticleDesc {
+    /// m.
+    pub position: DVec3,
+    /// m/s.
+    pub velocity: DVec3,
+    /// kg, above 0.
+    pub mass: f64,
+    /// What it collides with; a ball as a rule.
+    pub collider: Option<Collider>,
+}
+
+/// A body: its slice and what does not change from tick to tick.
+#[derive(Clone, Debug)]
+pub(crate) struct Body {
+    pub kind: DofKind,
+    pub slice: Slice,
+    /// Counts up with every body of the world; never used twice.
+    pub serial: u32,
+    /// kg.
+    pub mass: f64,
+    /// Principal moments, kg m²; zero for a particle.
+    pub inertia: DVec3,
+    pub collider: Option<Collider>,
+    /// Force and torque about the centre of mass asked for by code, for the coming tick, N and N m.
+    pub force: DVec3,
+    pub torque: DVec3,
+    /// Its index among the bodies that take part in this tick; [`ABSENT`] where it does not.
+    pub index: u32,
+    /// Its state became non-finite: it stays where it last was sane, outside dynamics and collision.
+    pub quarantined: bool,
+}
+
+/// Index of a body that does not take part.
+pub(crate) const ABSENT: u32 = u32::MAX;
+
+/// Velocity and angular velocity of a body, m/s and rad/s in world axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Twist {
+    pub linear: DVec3,
+    pub angular: DVec3,
+}
+
+impl Twist {
+    pub const REST: Self = Self { linear: DVec3::ZERO, angular: DVec3::ZERO };
+
+    /// Velocity of the point at `arm` from the centre of mass.
+    pub fn at(self, arm: DVec3) -> DVec3 {
+        self.linear + self.angular.cross(arm)
+    }
+}
+
+/// Position of the centre of mass and rotation of the principal axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Pose {
+    pub position: DVec3,
+    pub rotation: DQuat,
+}
+
+impl Pose {
+    pub const IDENTITY: Self = Self { position: DVec3::ZERO, rotation: DQuat::IDENTITY };
+
+    /// World position of a point of the body.
+    pub fn point(self, local: DVec3) -> DVec3 {
+        self.position + self.rotation * local
+    }
+}
+
+/// A body as the integrator sees it during one tick.
+///
+/// The unknown is the body's twist u at the end of the tick. Rotation is predicted: R* is where the body would be
+/// without any torque, and only the rest of the rotation is unknown, R1 = exp(dt (u_angular − free_spin)) R*. With the
+/// inertia frozen at R* the residual is the gradient of a convex kinetic term, angular momentum is exact and free spin
+/// loses no energy (DESIGN, section 3).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Node {
+    /// Pose at the start of the tick.
+    pub start: Pose,
+    /// Rotation after the tick without torque.
+    pub free_rotation: DQuat,
+    /// Angular velocity at `free_rotation` without torque, rad/s.
+    pub free_spin: DVec3,
+    /// Twist at the end of the tick under gravity and outer forces alone.
+    pub target: Twist,
+    /// Twist at the start of the tick.
+    pub before: Twist,
+    pub mass: f64,
+    /// World inertia at `free_rotation`, kg m²; identity where the body does not rotate.
+    pub inertia: DMat3,
+    /// Its inverse.
+    pub inverse_inertia: DMat3,
+    pub rotates: bool,
+}
+
+impl Node {
+    /// Pose after a tick of `dt` with twist `u`.
+    pub fn pose(&self, u: Twist, dt: f64) -> Pose {
+        let position = self.start.position + dt * u.linear;
+        if !self.rotates {
+            return Pose { position, rotation: DQuat::IDENTITY };
+        }
+        let turn = DQuat::from_scaled_axis(dt * (u.angular - self.free_spin));
+        Pose { position, rotation: (turn * self.free_rotation).normalize() }
+    }
+}
+
+impl Body {
+    /// The body's start of a tick.
+    pub fn node(&self, state: &State, dt: f64, gravity: DVec3) -> Node {
+        let (q, v) = (state.q(self.slice), state.v(self.slice));
+        match self.kind {
+            DofKind::Particle => particle::node(self, q, v, dt, gravity),
+            DofKind::RigidBody => rigid_body::node(self, q, v, dt, gravity),
+        }
+    }
+
+    /// Writes the state after a tick with twist `u` at its end.
+    pub fn advance(&self, node: &Node, u: Twist, dt: f64, state: &mut State) {
+        match self.kind {
+            DofKind::Particle => particle::advance(self, node, u, dt, state),
+            DofKind::RigidBody => rigid_body::advance(self, node, u, dt, state),
+        }
+    }
+
+    pub fn pose(&self, state: &State) -> Pose {
+        match self.kind {
+            DofKind::Particle => Pose { position: particle::position(state.q(self.slice)), ..Pose::IDENTITY },
+            DofKind::RigidBody => rigid_body::pose(state.q(self.slice)),
+        }
+    }
+
+    pub fn twist(&self, state: &State) -> Twist {
+        match self.kind {
+            DofKind::Particle => Twist { linear: particle::velocity(state.v(self.slice)), angular: DVec3::ZERO },
+            DofKind::RigidBody => rigid_body::twist(state.v(self.slice)),
+        }
+    }
+
+    pub fn set_pose(&self, pose: Pose, state: &mut State) {
+        let q = state.q_mut(self.slice);
+        q[..3].copy_from_slice(&pose.position.to_array());
+        if self.kind == DofKind::RigidBody {
+            q[3..].copy_from_slice(&pose.rotation.to_array());
+        }
+    }
+
+    pub fn set_twist(&self, twist: Twist, state: &mut State) {
+        let v = state.v_mut(self.slice);
+        v[..3].copy_from_slice(&twist.linear.to_array());
+        if self.kind == DofKind::RigidBody {
+            v[3..].copy_from_slice(&twist.angular.to_array());
+        }
+    }
+
+    pub fn is_finite(&self, state: &State) -> bool {
+        state.q(self.slice).iter().chain(state.v(self.slice)).all(|x| x.is_finite())
+    }
+
+    /// Angular momentum about the centre of mass, kg m²/s.
+    pub fn spin_momentum(&self, state: &State) -> DVec3 {
+        match self.kind {
+            DofKind::Particle => DVec3::ZERO,
+            DofKind::RigidBody => {
+                let rotation = self.pose(state).rotation;
+                rotation * (self.inertia * (rotation.inverse() * self.twist(state).angular))
+            }
+        }
+    }
+}
+
+pub(crate) fn validate_rigid_body(desc: &RigidBodyDesc) -> Result<(), SimError> {
+    require_vector(desc.position, "position")?;
+    require_rotation(desc.rotation, "rotation")?;
+    require_vector(desc.velocity, "velocity")?;
+    require_vector(desc.angular_velocity, "angular_velocity")?;
+    require(desc.mass > 0.0, "mass", desc.mass, "above 0 kg")?;
+    require_vector(desc.inertia, "inertia")?;
+    let least = desc.inertia.min_element();
+    require(least > 0.0, "inertia", least, "above 0 kg m²")?;
+    desc.collider.as_ref().map_or(Ok(()), Collider::validate)
+}
+
+pub(crate) fn validate_particle(desc: &ParticleDesc) -> Result<(), SimError> {
+    require_vector(desc.position, "position")?;
+    require_vector(desc.velocity, "velocity")?;
+    require(desc.mass > 0.0, "mass", desc.mass, "above 0 kg")?;
+    desc.collider.as_ref().map_or(Ok(()), Collider::validate)
+}

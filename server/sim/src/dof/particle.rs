@@ -1,0 +1,38 @@
+//! Particle: 3 linear DOF, 0 angular. Linear kinematics and constant mass, so the talk's formula as it stands.
+
+use glam::{DMat3, DQuat, DVec3};
+
+use super::{Body, Node, Pose, Twist};
+use crate::state::State;
+
+/// Numbers in Q and in Q'.
+pub(crate) const SIZE: (u8, u8) = (3, 3);
+
+pub(super) fn position(q: &[f64]) -> DVec3 {
+    DVec3::from_slice(q)
+}
+
+pub(super) fn velocity(v: &[f64]) -> DVec3 {
+    DVec3::from_slice(v)
+}
+
+pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: DVec3) -> Node {
+    let linear = velocity(v);
+    Node {
+        start: Pose { position: position(q), rotation: DQuat::IDENTITY },
+        free_rotation: DQuat::IDENTITY,
+        free_spin: DVec3::ZERO,
+        target: Twist { linear: linear + dt * (gravity + body.force / body.mass), angular: DVec3::ZERO },
+        before: Twist { linear, angular: DVec3::ZERO },
+        mass: body.mass,
+        inertia: DMat3::IDENTITY,
+        inverse_inertia: DMat3::IDENTITY,
+        rotates: false,
+    }
+}
+
+pub(super) fn advance(body: &Body, node: &Node, u: Twist, dt: f64, state: &mut State) {
+    let q1 = node.start.position + dt * u.linear;
+    state.q_mut(body.slice).copy_from_slice(&q1.to_array());
+    state.v_mut(body.slice).copy_from_slice(&u.linear.to_array());
+}

@@ -1,0 +1,46 @@
+//! What the engine refuses, and why.
+
+/// A call that the engine refuses. Nothing was changed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SimError {
+    /// A number out of its range, or not finite.
+    #[error("{what} is {value}, allowed is {allowed}")]
+    OutOfRange {
+        /// Which number.
+        what: &'static str,
+        /// What it was.
+        value: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
+    /// A handle whose body, static or potential is gone.
+    #[error("{what} does not exist (any more)")]
+    Gone {
+        /// What the handle was for.
+        what: &'static str,
+    },
+    /// Something that makes no sense between these bodies.
+    #[error("{what}")]
+    Unusable {
+        /// Why not.
+        what: &'static str,
+    },
+}
+
+/// `Err` unless `value` is finite and `ok`.
+pub(crate) fn require(ok: bool, what: &'static str, value: f64, allowed: &'static str) -> Result<(), SimError> {
+    if ok && value.is_finite() { Ok(()) } else { Err(SimError::OutOfRange { what, value, allowed }) }
+}
+
+/// `Err` unless all numbers are finite and smaller than 1e9.
+pub(crate) fn require_vector(vector: glam::DVec3, what: &'static str) -> Result<(), SimError> {
+    let largest = vector.abs().max_element();
+    let value = if vector.is_finite() { largest } else { f64::NAN };
+    require(largest < 1e9, what, value, "finite and below 1e9")
+}
+
+/// `Err` unless the quaternion is finite and of unit length within 1e-3.
+pub(crate) fn require_rotation(rotation: glam::DQuat, what: &'static str) -> Result<(), SimError> {
+    let length = rotation.length();
+    require((length - 1.0).abs() < 1e-3, what, length, "a quaternion of length 1")
+}

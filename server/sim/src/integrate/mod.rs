@@ -1,0 +1,44 @@
+//! Implicit Euler: from Q0, Q0' and the potentials to Q1, Q1' (the talk's "BOOM!").
+//!
+//! [`problem`] is an island with its potentials as one residual; [`newton`] makes the residual zero (the Cel Damage
+//! solver: truncated Newton), with the [`line_search`], the sparse [`system`] and the [`conjugate_gradient`] under it.
+//! Islands share nothing while they are solved, so that threads cannot change the result.
+
+pub(crate) mod block;
+mod conjugate_gradient;
+mod line_search;
+mod newton;
+pub(crate) mod problem;
+mod step;
+mod system;
+
+pub(crate) use step::{Integrator, Scene};
+
+/// What the last integration did.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StepReport {
+    /// Bodies that took part.
+    pub bodies: usize,
+    /// Islands of more than one body, or with potentials.
+    pub islands: usize,
+    /// Unknowns.
+    pub dof: usize,
+    /// Contact points.
+    pub contacts: usize,
+    /// Newton iterations, summed over islands.
+    pub newton_iterations: usize,
+    /// Iterations of the linear solver, summed over islands.
+    pub linear_iterations: usize,
+    /// Evaluations of the residual, summed over islands.
+    pub evaluations: usize,
+    /// Islands that stopped above the tolerance.
+    pub unconverged_islands: usize,
+    /// Largest residual of any body at the end, m/s.
+    pub residual: f64,
+    /// Deepest contact at the end of the tick, m.
+    pub worst_penetration: f64,
+    /// Widest gap of any joint at the end of the tick, m.
+    pub worst_joint_gap: f64,
+    /// Bodies that were quarantined in this tick because their state became non-finite.
+    pub quarantined: usize,
+}

@@ -1,0 +1,243 @@
+//! The linear system of a Newton iteration: a symmetric block-sparse matrix, and its incomplete factorisation.
+//!
+//! Stored is the lower triangle, row by row, columns ascending. The factorisation IC(0) keeps that pattern; in the
+//! elimination order that [`island`](crate::island) gives it is exact on trees and towers.
+
+use super::block::{
+    Block, Entry, backward_substitute, cholesky, dot, forward_substitute, multiply_add, multiply_sub, product_sub,
+    transposed_multiply_add, transposed_multiply_sub, zero,
+};
+use super::problem::{Problem, Visitor};
+use crate::potential::{Candidate, FIXED, NodeIndex, PairBlocks, Term};
+
+/// Pivots below this fraction of the diagonal are a breakdown of the incomplete factorisation.
+const PIVOT_FLOOR: f64 = 1e-10;
+
+/// Marks a term without an off-diagonal block.
+const NONE: u32 = u32::MAX;
+
+/// A symmetric positive definite block matrix with its preconditioner.
+#[derive(Default)]
+pub(super) struct System<const D: usize> {
+    /// `columns[rows[i]..rows[i + 1]]` are the columns of row i, all below i.
+    rows: Vec<u32>,
+    columns: Vec<u32>,
+    diagonal: Vec<Block<D>>,
+    lower: Vec<Block<D>>,
+    factor_diagonal: Vec<Block<D>>,
+    factor_lower: Vec<Block<D>>,
+    /// Off-diagonal block of each term, in the order of visits.
+    slots: Vec<u32>,
+    pairs: Vec<(u32, u32)>,
+}
+
+impl<const D: usize> System<D> {
+    /// Finds the sparsity pattern of `problem`.
+    pub fn analyse(&mut self, problem: &mut Problem) {
+        let n = problem.nodes.len();
+        self.pairs.clear();
+        problem.terms.visit(&mut Pairs { pairs: &mut self.pairs });
+        self.pairs.sort_unstable();
+        self.pairs.dedup();
+        self.rows.clear();
+        self.rows.resize(n + 1, 0);
+        self.columns.clear();
+        for &(row, column) in &self.pairs {
+            self.rows[row as usize + 1] += 1;
+            self.columns.push(column);
+        }
+        for i in 0..n {
+            self.rows[i + 1] += self.rows[i];
+        }
+        self.slots.clear();
+        problem.terms.visit(&mut Slots { rows: &self.rows, columns: &self.columns, slots: &mut self.slots });
+        self.diagonal.resize(n, zero());
+        self.lower.resize(self.columns.len(), zero());
+        self.factor_diagonal.resize(n, zero());
+        self.factor_lower.resize(self.columns.len(), zero());
+    }
+
+    /// Sums up M + dt² ∂²Φ at the problem's trial and factorises it.
+    pub fn assemble(&mut self, problem: &mut Problem) {
+        for (block, node) in self.diagonal.iter_mut().zip(&problem.nodes) {
+            *block = zero();
+            for i in 0..3 {
+                block[i][i] = node.mass;
+            }
+            if D == 6 {
+                for j in 0..3 {
+                    let column = node.inertia.col(j).to_array();
+                    for i in 0..3 {
+                        block[3 + i][3 + j] = column[i];
+                    }
+                }
+            }
+        }
+        self.lower.fill(zero());
+        let candidate = Candidate { dt: problem.dt, trial: &problem.trial };
+        problem.terms.visit(&mut Assemble {
+            candidate,
+            diagonal: &mut self.diagonal,
+            lower: &mut self.lower,
+            slots: self.slots.iter(),
+        });
+        self.factorise();
+    }
+
+    /// y = A x.
+    pub fn multiply(&self, x: &[Entry<D>], y: &mut [Entry<D>]) {
+        for i in 0..y.len() {
+            y[i] = [0.0; D];
+            multiply_add(&self.diagonal[i], &x[i], &mut y[i]);
+            for k in self.row(i) {
+                let j = self.columns[k] as usize;
+                multiply_add(&self.lower[k], &x[j], &mut y[i]);
+                transposed_multiply_add(&self.lower[k], &x[i], &mut y[j]);
+            }
+        }
+    }
+
+    /// x ← (L Lᵀ)⁻¹ x, the preconditioner.
+    pub fn precondition(&self, x: &mut [Entry<D>]) {
+        for i in 0..x.len() {
+            let mut entry = x[i];
+            for k in self.row(i) {
+                multiply_sub(&self.factor_lower[k], &x[self.columns[k] as usize], &mut entry);
+            }
+            forward_substitute(&self.factor_diagonal[i], &mut entry);
+            x[i] = entry;
+        }
+        for i in (0..x.len()).rev() {
+            backward_substitute(&self.factor_diagonal[i], &mut x[i]);
+            let entry = x[i];
+            for k in self.row(i) {
+                transposed_multiply_sub(&self.factor_lower[k], &entry, &mut x[self.columns[k] as usize]);
+            }
+        }
+    }
+
+    fn row(&self, i: usize) -> std::ops::Range<usize> {
+        self.rows[i] as usize..self.rows[i + 1] as usize
+    }
+
+    /// Block IC(0): L has the pattern of A's lower triangle.
+    fn factorise(&mut self) {
+        for i in 0..self.diagonal.len() {
+            let mut diagonal = self.diagonal[i];
+            for k in self.row(i) {
+                let j = self.columns[k] as usize;
+                let mut block = self.lower[k];
+                self.subtract_common(i, j, k, &mut block);
+                // L_ij = A_ij L_jj⁻ᵀ: each row of it solves L_jj x = row.
+                for row in &mut block {
+                    forward_substitute(&self.factor_diagonal[j], row);
+                }
+                product_sub(&block, &block, &mut diagonal);
+                self.factor_lower[k] = block;
+            }
+            self.factor_diagonal[i] = cholesky(&diagonal, PIVOT_FLOOR)
+                .or_else(|| cholesky(&self.diagonal[i], 0.0))
+                .unwrap_or_else(|| unit_scaled(&self.diagonal[i]));
+        }
+    }
+
+    /// block −= Σ_m L_im L_jmᵀ over the columns m that rows i (before place `end`) and j share.
+    fn subtract_common(&self, i: usize, j: usize, end: usize, block: &mut Block<D>) {
+        let (mut p, mut q) = (self.row(i).start, self.row(j).start);
+        let q_end = self.row(j).end;
+        while p < end && q < q_end {
+            match self.columns[p].cmp(&self.columns[q]) {
+                std::cmp::Ordering::Less => p += 1,
+                std::cmp::Ordering::Greater => q += 1,
+                std::cmp::Ordering::Equal => {
+                    product_sub(&self.factor_lower[p], &self.factor_lower[q], block);
+                    p += 1;
+                    q += 1;
+                }
+            }
+        }
+    }
+}
+
+/// Last resort for a diagonal block that rounding has made indefinite: the root of its diagonal.
+fn unit_scaled<const D: usize>(a: &Block<D>) -> Block<D> {
+    let mut l = zero();
+    for i in 0..D {
+        l[i][i] = a[i][i].abs().max(f64::MIN_POSITIVE).sqrt();
+    }
+    l
+}
+
+/// Row and column of the lower-triangle block between two bodies.
+fn place([a, b]: [NodeIndex; 2]) -> Option<(u32, u32)> {
+    (a != FIXED && b != FIXED).then(|| (a.max(b), a.min(b)))
+}
+
+struct Pairs<'a> {
+    pairs: &'a mut Vec<(u32, u32)>,
+}
+
+impl Visitor for Pairs<'_> {
+    fn visit<T: Term>(&mut self, terms: &mut [T]) {
+        self.pairs.extend(terms.iter().filter_map(|term| place(term.nodes())));
+    }
+}
+
+struct Slots<'a> {
+    rows: &'a [u32],
+    columns: &'a [u32],
+    slots: &'a mut Vec<u32>,
+}
+
+impl Visitor for Slots<'_> {
+    fn visit<T: Term>(&mut self, terms: &mut [T]) {
+        for term in terms {
+            let slot = place(term.nodes()).and_then(|(row, column)| {
+                let (start, end) = (self.rows[row as usize], self.rows[row as usize + 1]);
+                let found = self.columns[start as usize..end as usize].binary_search(&column);
+                found.ok().map(|k| start + k as u32)
+            });
+            self.slots.push(slot.unwrap_or(NONE));
+        }
+    }
+}
+
+struct Assemble<'a, const D: usize> {
+    candidate: Candidate<'a>,
+    diagonal: &'a mut [Block<D>],
+    lower: &'a mut [Block<D>],
+    slots: std::slice::Iter<'a, u32>,
+}
+
+impl<const D: usize> Visitor for Assemble<'_, D> {
+    fn visit<T: Term>(&mut self, terms: &mut [T]) {
+        let factor = self.candidate.dt * self.candidate.dt;
+        for (term, &slot) in terms.iter().zip(&mut self.slots) {
+            let PairBlocks { aa, ab, bb } = term.hessian(&self.candidate);
+            let [a, b] = term.nodes();
+            if a != FIXED {
+                add_scaled(&mut self.diagonal[a as usize], &aa, factor, false);
+            }
+            if b != FIXED {
+                add_scaled(&mut self.diagonal[b as usize], &bb, factor, false);
+            }
+            if slot != NONE {
+                add_scaled(&mut self.lower[slot as usize], &ab, factor, a < b);
+            }
+        }
+    }
+}
+
+/// target += factor source, or its transpose; the leading D×D part of it.
+fn add_scaled<const D: usize>(target: &mut Block<D>, source: &Block<6>, factor: f64, transposed: bool) {
+    for i in 0..D {
+        for j in 0..D {
+            target[i][j] += factor * if transposed { source[j][i] } else { source[i][j] };
+        }
+    }
+}
+
+/// Scalar product of two vectors.
+pub(super) fn inner<const D: usize>(a: &[Entry<D>], b: &[Entry<D>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| dot(a, b)).sum()
+}

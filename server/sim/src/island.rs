@@ -1,0 +1,218 @@
+//! Islands: bodies that potentials couple this tick, the unit of solving.
+//!
+//! Every island lists its bodies in elimination order: repeatedly the body with the fewest neighbours left. On trees and
+//! towers a factorisation in this order has no fill.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// The islands of a tick.
+#[derive(Default)]
+pub(crate) struct Islands {
+    /// Union-find forest over bodies.
+    parent: Vec<u32>,
+    coupled: Vec<bool>,
+    couplings: Vec<(u32, u32)>,
+    starts: Vec<u32>,
+    members: Vec<u32>,
+    places: Vec<Place>,
+    scratch: Scratch,
+}
+
+/// Where a body stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Place {
+    /// Its island; [`Place::FREE`] where nothing couples it.
+    pub island: u32,
+    /// Its index there.
+    pub index: u32,
+}
+
+impl Place {
+    /// A body without potentials.
+    pub const FREE: Self = Self { island: u32::MAX, index: u32::MAX };
+}
+
+#[derive(Default)]
+struct Scratch {
+    neighbour_starts: Vec<u32>,
+    neighbours: Vec<u32>,
+    degree: Vec<u32>,
+    heap: BinaryHeap<Reverse<(u32, u32)>>,
+    elimination: Vec<u32>,
+    island_of_root: Vec<u32>,
+}
+
+impl Islands {
+    /// Starts a tick with `bodies` bodies.
+    pub fn begin(&mut self, bodies: usize) {
+        self.parent.clear();
+        self.parent.extend(0..bodies as u32);
+        self.coupled.clear();
+        self.coupled.resize(bodies, false);
+        self.couplings.clear();
+    }
+
+    /// A potential acts on `a` alone.
+    pub fn touch(&mut self, a: u32) {
+        self.coupled[a as usize] = true;
+    }
+
+    /// A potential acts between `a` and `b`.
+    pub fn couple(&mut self, a: u32, b: u32) {
+        self.touch(a);
+        self.touch(b);
+        self.couplings.push((a.min(b), a.max(b)));
+        let (a, b) = (self.root(a), self.root(b));
+        // The smaller root wins, so that islands are numbered by their first body.
+        self.parent[a.max(b) as usize] = a.min(b);
+    }
+
+    /// Sorts bodies into islands.
+    pub fn finish(&mut self) {
+        self.couplings.sort_unstable();
+        self.couplings.dedup();
+        self.order_elimination();
+        self.number_islands();
+    }
+
+    /// Number of islands.
+    pub fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// Bodies of an island, in elimination order.
+    pub fn members(&self, island: usize) -> &[u32] {
+        &self.members[self.starts[island] as usize..self.starts[island + 1] as usize]
+    }
+
+    /// Island and index of a body.
+    pub fn place(&self, body: u32) -> Place {
+        self.places[body as usize]
+    }
+
+    fn root(&mut self, mut i: u32) -> u32 {
+        while self.parent[i as usize] != i {
+            let grandparent = self.parent[self.parent[i as usize] as usize];
+            self.parent[i as usize] = grandparent;
+            i = grandparent;
+        }
+        i
+    }
+
+    fn order_elimination(&mut self) {
+        let s = &mut self.scratch;
+        let n = self.parent.len();
+        s.degree.clear();
+        s.degree.resize(n, 0);
+        for &(a, b) in &self.couplings {
+            s.degree[a as usize] += 1;
+            s.degree[b as usize] += 1;
+        }
+        s.neighbour_starts.clear();
+        s.neighbour_starts.push(0);
+        let mut sum = 0;
+        for &degree in &s.degree {
+            sum += degree;
+            s.neighbour_starts.push(sum);
+        }
+        s.neighbours.clear();
+        s.neighbours.resize(sum as usize, 0);
+        // Fill from the back of each share; the starts end where they began.
+        let mut ends = std::mem::take(&mut s.elimination);
+        ends.clear();
+        ends.extend_from_slice(&s.neighbour_starts[1..]);
+        for &(a, b) in self.couplings.iter().rev() {
+            for (from, to) in [(a, b), (b, a)] {
+                ends[from as usize] -= 1;
+                s.neighbours[ends[from as usize] as usize] = to;
+            }
+        }
+        s.heap.clear();
+        s.heap.extend((0..n as u32).filter(|&i| self.coupled[i as usize]).map(|i| Reverse((s.degree[i as usize], i))));
+        ends.clear();
+        s.elimination = ends;
+        const DONE: u32 = u32::MAX;
+        while let Some(Reverse((degree, i))) = s.heap.pop() {
+            // An entry whose degree has changed since is stale: a newer one is in the heap.
+            if s.degree[i as usize] != degree {
+                continue;
+            }
+            s.degree[i as usize] = DONE;
+            s.elimination.push(i);
+            let (start, end) = (s.neighbour_starts[i as usize], s.neighbour_starts[i as usize + 1]);
+            for &j in &s.neighbours[start as usize..end as usize] {
+                let degree = &mut s.degree[j as usize];
+                if *degree != DONE {
+                    *degree -= 1;
+                    s.heap.push(Reverse((*degree, j)));
+                }
+            }
+        }
+    }
+
+    fn number_islands(&mut self) {
+        let n = self.parent.len();
+        self.places.clear();
+        self.places.resize(n, Place::FREE);
+        self.starts.clear();
+        self.starts.push(0);
+        let mut island_of_root = std::mem::take(&mut self.scratch.island_of_root);
+        island_of_root.clear();
+        island_of_root.resize(n, 0);
+        for i in 0..n as u32 {
+            if !self.coupled[i as usize] {
+                continue;
+            }
+            let root = self.root(i);
+            if root == i {
+                island_of_root[i as usize] = self.len() as u32;
+                self.starts.push(0);
+            }
+            let island = island_of_root[root as usize];
+            self.places[i as usize].island = island;
+            self.starts[island as usize + 1] += 1;
+        }
+        for island in 0..self.len() {
+            self.starts[island + 1] += self.starts[island];
+        }
+        self.members.clear();
+        self.members.resize(self.scratch.elimination.len(), 0);
+        let counts = &mut island_of_root;
+        counts.clear();
+        counts.resize(self.starts.len(), 0);
+        for &i in &self.scratch.elimination {
+            let place = &mut self.places[i as usize];
+            let count = &mut counts[place.island as usize];
+            place.index = *count;
+            self.members[(self.starts[place.island as usize] + *count) as usize] = i;
+            *count += 1;
+        }
+        self.scratch.island_of_root = island_of_root;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_star_is_eliminated_from_its_leaves() {
+        let mut islands = Islands::default();
+        for _ in 0..2 {
+            islands.begin(8);
+            islands.touch(7);
+            for leaf in [0, 2, 3, 4] {
+                islands.couple(leaf, 1);
+            }
+            islands.finish();
+            assert_eq!(islands.len(), 2);
+            let members = islands.members(0);
+            assert_eq!(members.len(), 5);
+            assert!(members.iter().position(|&m| m == 1).unwrap() >= 3, "{members:?}");
+            assert_eq!(islands.members(1), [7]);
+            assert_eq!(islands.place(5), Place::FREE);
+            assert_eq!(islands.place(7), Place { island: 1, index: 0 });
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! Axle: carries a wheel on a chassis. The wheel slides along the chassis' y axis against a spring and damper, steers
+//! about it, spins about its own z axis, and is driven and braked.
+//!
+//! Suspension is the author's stiffness; what keeps the hub on its line and the wheel in its plane is penalty whose
+//! stiffness the engine chooses.
+
+use glam::{DMat3, DQuat, DVec3};
+
+use super::{Candidate, NodeIndex, PairBlocks, Term, Wrench, outer};
+use crate::dof::{BodyId, Node};
+use crate::error::{SimError, require, require_vector};
+
+slotmap::new_key_type! {
+    /// Handle of an axle.
+    pub struct AxleId;
+}
+
+/// An axle to be added. Chassis and wheel do not collide with each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxleDesc {
+    /// The body that is carried.
+    pub chassis: BodyId,
+    /// The body that rolls.
+    pub wheel: BodyId,
+    /// Where the wheel's centre is without load, in the chassis' frame, m.
+    pub hub: DVec3,
+    /// Suspension, N/m.
+    pub stiffness: f64,
+    /// Suspension, N s/m.
+    pub damping: f64,
+    /// Steering, drive and brake at the start.
+    pub control: AxleControl,
+}
+
+/// What a driver does to a wheel; may be changed at any tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AxleControl {
+    /// About the chassis' y axis, rad; positive turns left.
+    pub steer: f64,
+    /// Drive.
+    pub drive: Motor,
+    /// Largest torque against any spin, N m.
+    pub brake: f64,
+}
+
+/// A motor: torque clamp(gain (target − spin), ±max_torque) about the wheel's z axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Motor {
+    /// Spin against the chassis, rad/s; driving towards +x is negative.
+    pub target_speed: f64,
+    /// N m s/rad.
+    pub gain: f64,
+    /// N m.
+    pub max_torque: f64,
+}
+
+/// Gain of a brake, in wheel inertias per tick: stiff enough that a parked car does not creep.
+const BRAKE_GAIN: f64 = 1e4;
+
+impl AxleControl {
+    pub(crate) fn validate(&self) -> Result<(), SimError> {
+        require(self.steer.abs() < std::f64::consts::FRAC_PI_2, "steer", self.steer, "-90 to 90 degrees")?;
+        require(true, "drive.target_speed", self.drive.target_speed, "finite")?;
+        require(self.drive.gain >= 0.0, "drive.gain", self.drive.gain, "0 N m s/rad or more")?;
+        require(self.drive.max_torque >= 0.0, "drive.max_torque", self.drive.max_torque, "0 N m or more")?;
+        require(self.brake >= 0.0, "brake", self.brake, "0 N m or more")
+    }
+}
+
+impl AxleDesc {
+    pub(crate) fn validate(&self) -> Result<(), SimError> {
+        require_vector(self.hub, "hub")?;
+        require(self.stiffness >= 0.0, "stiffness", self.stiffness, "0 N/m or more")?;
+        require(self.damping >= 0.0, "damping", self.damping, "0 N s/m or more")?;
+        self.control.validate()
+    }
+}
+
+/// An axle in an island.
+#[derive(Clone, Debug)]
+pub(crate) struct AxleTerm {
+    /// Chassis, wheel.
+    pub nodes: [NodeIndex; 2],
+    desc: AxleDesc,
+    /// Of the two directions in which the hub may not move, N/m.
+    hub_stiffness: f64,
+    /// Of the two turns that the wheel may not make, N m/rad.
+    plane_stiffness: f64,
+    /// Wheel's axis in the chassis' frame.
+    axis: DVec3,
+    /// Wheel's axis at the start of the tick, about which spins and torques are measured.
+    spin_axis: DVec3,
+    /// Hub along the chassis' y axis at the start of the tick, m.
+    start_travel: f64,
+    brake_gain: f64,
+}
+
+impl AxleTerm {
+    /// `joint_stiffness` in reduced masses per dt².
+    pub fn new(nodes: [NodeIndex; 2], desc: &AxleDesc, all: &[Node], joint_stiffness: f64, dt: f64) -> Self {
+        let [chassis, wheel] = nodes.map(|i| &all[i as usize]);
+        let axis = DQuat::from_rotation_y(desc.control.steer) * DVec3::Z;
+        let spin_axis = wheel.free_rotation * DVec3::Z;
+        let across = spin_axis.any_orthonormal_vector();
+        let inertia = |node: &Node| across.dot(node.inertia * across);
+        let reduced_inertia = (inertia(chassis).recip() + inertia(wheel).recip()).recip();
+        let start = chassis.start.rotation.inverse() * (wheel.start.position - chassis.start.position);
+        Self {
+            nodes,
+            desc: *desc,
+            hub_stiffness: joint_stiffness * super::reduced_mass(all, nodes) / (dt * dt),
+            plane_stiffness: joint_stiffness * reduced_inertia / (dt * dt),
+            axis,
+            spin_axis,
+            start_travel: start.y,
+            brake_gain: BRAKE_GAIN * spin_axis.dot(wheel.inertia * spin_axis) / dt,
+        }
+    }
+
+    /// Hub in the chassis' frame, from where it would be without load, m.
+    fn travel(&self, at: &Candidate) -> DVec3 {
+        let (chassis, wheel) = (at.pose(self.nodes[0]), at.pose(self.nodes[1]));
+        chassis.rotation.inverse() * (wheel.position - chassis.position) - self.desc.hub
+    }
+
+    /// Distance of the hub from its line, m.
+    pub fn gap(&self, at: &Candidate) -> f64 {
+        let travel = self.travel(at);
+        travel.x.hypot(travel.z)
+    }
+
+    fn spin(&self, at: &Candidate) -> f64 {
+        self.spin_axis.dot(at.twist(self.nodes[1]).angular - at.twist(self.nodes[0]).angular)
+    }
+
+    /// The two clamped torques on a wheel at `spin`: (gain, spin error, limit).
+    fn motors(&self, spin: f64) -> [(f64, f64, f64); 2] {
+        let AxleControl { drive, brake, .. } = self.desc.control;
+        [(drive.gain, spin - drive.target_speed, drive.max_torque), (self.brake_gain, spin, brake)]
+    }
+}
+
+impl Term for AxleTerm {
+    fn nodes(&self) -> [NodeIndex; 2] {
+        self.nodes
+    }
+
+    fn evaluate(&self, at: &Candidate) -> (f64, [Wrench; 2]) {
+        let (chassis, wheel) = (at.pose(self.nodes[0]), at.pose(self.nodes[1]));
+        let travel = self.travel(at);
+        let motion = travel.y + self.desc.hub.y - self.start_travel;
+        let (spring, damper) = (self.desc.stiffness, self.desc.damping / at.dt);
+        let local = DVec3::new(
+            self.hub_stiffness * travel.x,
+            spring * travel.y + damper * motion,
+            self.hub_stiffness * travel.z,
+        );
+        let mut energy = 0.5 * self.hub_stiffness * (travel.x * travel.x + travel.z * travel.z)
+            + 0.5 * spring * travel.y * travel.y
+            + 0.5 * damper * motion * motion;
+        let force = chassis.rotation * local;
+        let arm = wheel.position - chassis.position;
+        let (wanted, actual) = (chassis.rotation * self.axis, wheel.rotation * DVec3::Z);
+        energy += 0.5 * self.plane_stiffness * (wanted - actual).length_squared();
+        // Derivative of ½|z − z'|² with respect to a turn of the wheel, whose z is the second.
+        let mut torque = wanted.cross(actual) * self.plane_stiffness;
+        for (gain, error, limit) in self.motors(self.spin(at)) {
+            let (value, slope) = clamped(gain, error, limit);
+            energy += at.dt * value;
+            torque += self.spin_axis * slope;
+        }
+        let on_chassis = Wrench { force: -force, torque: -arm.cross(force) - torque };
+        (energy, [on_chassis, Wrench { force, torque }])
+    }
+
+    fn hessian(&self, at: &Candidate) -> PairBlocks {
+        let (chassis, wheel) = (at.pose(self.nodes[0]), at.pose(self.nodes[1]));
+        let r = DMat3::from_quat(chassis.rotation);
+        let along = self.desc.stiffness + self.desc.damping / at.dt;
+        let local = DMat3::from_diagonal(DVec3::new(self.hub_stiffness, along, self.hub_stiffness));
+        let arm = wheel.position - chassis.position;
+        let mut blocks = PairBlocks::of_points(r * local * r.transpose(), arm, DVec3::ZERO);
+        let axis = wheel.rotation * DVec3::Z;
+        let spin = self.spin(at);
+        let motors: f64 = self
+            .motors(spin)
+            .into_iter()
+            .filter(|&(gain, error, limit)| gain * error.abs() < limit)
+            .map(|(gain, ..)| gain / at.dt)
+            .sum();
+        let plane = (DMat3::IDENTITY - outer(axis, axis)) * self.plane_stiffness;
+        blocks.add_rotation(plane + outer(self.spin_axis, self.spin_axis) * motors);
+        blocks
+    }
+}
+
+/// Huber's function of `error`: its value and its derivative clamp(gain error, ±limit).
+fn clamped(gain: f64, error: f64, limit: f64) -> (f64, f64) {
+    let slope = gain * error;
+    if slope.abs() <= limit {
+        (0.5 * slope * error, slope)
+    } else {
+        (limit * (error.abs() - 0.5 * limit / gain), limit * error.signum())
+    }
+}

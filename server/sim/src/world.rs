@@ -1,0 +1,468 @@
+//! The world: bodies, potentials and static geometry under generational handles, and the two stages of the pipeline that
+//! are the engine's.
+
+use glam::{DQuat, DVec3};
+use slotmap::SlotMap;
+
+use crate::collide::{ContactView, Detector, Moving, Partner, StaticDesc, StaticId};
+use crate::dof::{self, ABSENT, Body, BodyId, DofKind, ParticleDesc, Pose, RigidBodyDesc, Twist, particle, rigid_body};
+use crate::error::{SimError, require_rotation, require_vector};
+use crate::integrate::{Integrator, Scene, StepReport};
+use crate::potential::{
+    Anchor, AxleControl, AxleDesc, AxleId, BallJoint, BallJointDesc, BallJointId, PdControl, PdDesc, PdGains, PdId,
+    Potentials, SpringDesc, SpringId,
+};
+use crate::settings::Settings;
+use crate::state::State;
+
+/// A running world.
+pub struct World {
+    settings: Settings,
+    state: State,
+    bodies: SlotMap<BodyId, Body>,
+    /// All bodies, in order of serial.
+    order: Vec<BodyId>,
+    serials: u32,
+    potentials: Potentials,
+    detector: Detector,
+    integrator: Integrator,
+    report: StepReport,
+}
+
+/// A body's share of Q and Q'.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SliceView<'a> {
+    /// Names the body for as long as the world lives; never used twice.
+    pub serial: u32,
+    /// What the numbers mean.
+    pub kind: DofKind,
+    /// Positions: m, and a unit quaternion x y z w for a rigid body.
+    pub q: &'a [f64],
+    /// Rates: m/s, and rad/s in world axes for a rigid body.
+    pub v: &'a [f64],
+}
+
+/// Energy of the world, J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// Of motion and spin.
+    pub kinetic: f64,
+    /// Against gravity, from the origin's height.
+    pub gravitational: f64,
+    /// In springs.
+    pub elastic: f64,
+}
+
+impl Energy {
+    /// Sum of all.
+    pub fn total(&self) -> f64 {
+        self.kinetic + self.gravitational + self.elastic
+    }
+}
+
+/// Momentum of the world.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Momentum {
+    /// kg m/s.
+    pub linear: DVec3,
+    /// About the origin, kg m²/s.
+    pub angular: DVec3,
+}
+
+impl World {
+    /// An empty world.
+    ///
+    /// # Errors
+    /// [`SimError::OutOfRange`] for a bad setting, [`SimError::Unusable`] where threads cannot be had.
+    pub fn new(settings: Settings) -> Result<Self, SimError> {
+        settings.validate()?;
+        let integrator = Integrator::new(settings.threads)
+            .map_err(|_| SimError::Unusable { what: "threads cannot be started: use fewer" })?;
+        Ok(Self {
+            settings,
+            state: State::default(),
+            bodies: SlotMap::with_key(),
+            order: Vec::new(),
+            serials: 0,
+            potentials: Potentials::default(),
+            detector: Detector::default(),
+            integrator,
+            report: StepReport::default(),
+        })
+    }
+
+    /// The settings that it was made with.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    // --- bodies ----------------------------------------------------------------------------------------------------
+
+    /// Adds a rigid body.
+    ///
+    /// # Errors
+    /// [`SimError`] naming the value that is out of range.
+    pub fn add_rigid_body(&mut self, desc: RigidBodyDesc) -> Result<BodyId, SimError> {
+        dof::validate_rigid_body(&desc)?;
+        let id = self.add_body(DofKind::RigidBody, rigid_body::SIZE, desc.mass, desc.inertia, desc.collider);
+        let body = &self.bodies[id];
+        body.set_pose(Pose { position: desc.position, rotation: desc.rotation.normalize() }, &mut self.state);
+        body.set_twist(Twist { linear: desc.velocity, angular: desc.angular_velocity }, &mut self.state);
+        Ok(id)
+    }
+
+    /// Adds a particle.
+    ///
+    /// # Errors
+    /// [`SimError`] naming the value that is out of range.
+    pub fn add_particle(&mut self, desc: ParticleDesc) -> Result<BodyId, SimError> {
+        dof::validate_particle(&desc)?;
+        let id = self.add_body(DofKind::Particle, particle::SIZE, desc.mass, DVec3::ZERO, desc.collider);
+        let body = &self.bodies[id];
+        body.set_pose(Pose { position: desc.position, ..Pose::IDENTITY }, &mut self.state);
+        body.set_twist(Twist { linear: desc.velocity, ..Twist::REST }, &mut self.state);
+        Ok(id)
+    }
+
+    /// Removes a body with every potential and contact that it has. Answers whether there was one.
+    pub fn remove_body(&mut self, id: BodyId) -> bool {
+        let Some(body) = self.bodies.remove(id) else { return false };
+        self.state.free(body.slice);
+        self.order.retain(|&other| other != id);
+        self.potentials.remove_body(id);
+        self.detector.forget(body.serial);
+        true
+    }
+
+    fn add_body(
+        &mut self,
+        kind: DofKind,
+        size: (u8, u8),
+        mass: f64,
+        inertia: DVec3,
+        collider: Option<crate::Collider>,
+    ) -> BodyId {
+        let (slice, serial) = (self.state.allocate(size.0, size.1), self.serials);
+        self.serials += 1;
+        let (force, torque, index, quarantined) = (DVec3::ZERO, DVec3::ZERO, ABSENT, false);
+        let body = Body { kind, slice, serial, mass, inertia, collider, force, torque, index, quarantined };
+        let id = self.bodies.insert(body);
+        self.order.push(id);
+        id
+    }
+
+    // --- static geometry -------------------------------------------------------------------------------------------
+
+    /// Adds a piece of static geometry.
+    ///
+    /// # Errors
+    /// [`SimError`] naming the value that is out of range.
+    pub fn add_static(&mut self, desc: StaticDesc) -> Result<StaticId, SimError> {
+        self.detector.add_static(desc)
+    }
+
+    /// Removes a piece of static geometry. Answers whether there was one.
+    pub fn remove_static(&mut self, id: StaticId) -> bool {
+        self.detector.remove_static(id)
+    }
+
+    // --- potentials ------------------------------------------------------------------------------------------------
+
+    /// Adds a spring with a damper.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, a body that is gone, or two ends at the same body.
+    pub fn add_spring(&mut self, desc: SpringDesc) -> Result<SpringId, SimError> {
+        desc.validate()?;
+        self.check_anchors(desc.a, desc.b)?;
+        Ok(self.potentials.springs.insert(desc))
+    }
+
+    /// Adds a ball joint.
+    ///
+    /// # Errors
+    /// As [`World::add_spring`].
+    pub fn add_ball_joint(&mut self, desc: BallJointDesc) -> Result<BallJointId, SimError> {
+        desc.validate()?;
+        self.check_anchors(desc.a, desc.b)?;
+        if let (Some(a), Some(b)) = (desc.a.body, desc.b.body) {
+            self.detector.exclude(self.bodies[a].serial, self.bodies[b].serial);
+        }
+        Ok(self.potentials.ball_joints.insert(BallJoint { desc, force: DVec3::ZERO }))
+    }
+
+    /// Adds an axle between two rigid bodies.
+    ///
+    /// # Errors
+    /// As [`World::add_spring`].
+    pub fn add_axle(&mut self, desc: AxleDesc) -> Result<AxleId, SimError> {
+        desc.validate()?;
+        let bodies = [desc.chassis, desc.wheel].map(|id| self.bodies.get(id));
+        let [Some(chassis), Some(wheel)] = bodies else { return Err(SimError::Gone { what: "a body of the axle" }) };
+        if chassis.kind != DofKind::RigidBody || wheel.kind != DofKind::RigidBody || desc.chassis == desc.wheel {
+            return Err(SimError::Unusable { what: "an axle needs two different rigid bodies" });
+        }
+        self.detector.exclude(chassis.serial, wheel.serial);
+        Ok(self.potentials.axles.insert(desc))
+    }
+
+    /// Adds a PD controller.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, for what this tick rate cannot show, or a body that is gone.
+    pub fn add_pd(&mut self, desc: PdDesc) -> Result<PdId, SimError> {
+        desc.control.validate()?;
+        let positive = desc.max_force > 0.0;
+        if !positive {
+            return Err(SimError::OutOfRange { what: "max_force", value: desc.max_force, allowed: "above 0 N" });
+        }
+        let gains = PdGains::new(desc.frequency, desc.damping_ratio, self.settings.dt)?;
+        if !self.bodies.contains_key(desc.body) {
+            return Err(SimError::Gone { what: "the body of the controller" });
+        }
+        Ok(self.potentials.pds.insert((desc, gains)))
+    }
+
+    /// Removes a spring. Answers whether there was one.
+    pub fn remove_spring(&mut self, id: SpringId) -> bool {
+        self.potentials.springs.remove(id).is_some()
+    }
+
+    /// Removes a ball joint. Answers whether there was one.
+    pub fn remove_ball_joint(&mut self, id: BallJointId) -> bool {
+        self.potentials.ball_joints.remove(id).is_some()
+    }
+
+    /// Removes a controller. Answers whether there was one.
+    pub fn remove_pd(&mut self, id: PdId) -> bool {
+        self.potentials.pds.remove(id).is_some()
+    }
+
+    /// What a driver does to a wheel now.
+    pub fn axle(&self, id: AxleId) -> Option<&AxleControl> {
+        self.potentials.axles.get(id).map(|axle| &axle.control)
+    }
+
+    /// Steers, drives and brakes a wheel from the coming tick on.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, or an axle that is gone.
+    pub fn set_axle(&mut self, id: AxleId, control: AxleControl) -> Result<(), SimError> {
+        control.validate()?;
+        self.potentials.axles.get_mut(id).ok_or(SimError::Gone { what: "the axle" })?.control = control;
+        Ok(())
+    }
+
+    /// Moves a controller's target.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, or a controller that is gone.
+    pub fn set_pd(&mut self, id: PdId, control: PdControl) -> Result<(), SimError> {
+        control.validate()?;
+        self.potentials.pds.get_mut(id).ok_or(SimError::Gone { what: "the controller" })?.0.control = control;
+        Ok(())
+    }
+
+    fn check_anchors(&self, a: Anchor, b: Anchor) -> Result<(), SimError> {
+        for anchor in [a, b] {
+            let Some(id) = anchor.body else { continue };
+            let body = self.bodies.get(id).ok_or(SimError::Gone { what: "a body of the potential" })?;
+            if body.kind == DofKind::Particle && anchor.point != DVec3::ZERO {
+                return Err(SimError::Unusable { what: "a particle has no point but its own: use 0, 0, 0" });
+            }
+        }
+        if a.body == b.body {
+            return Err(SimError::Unusable { what: "both ends are at the same body" });
+        }
+        Ok(())
+    }
+
+    // --- state -----------------------------------------------------------------------------------------------------
+
+    /// Centre of mass, m.
+    pub fn position(&self, id: BodyId) -> Option<DVec3> {
+        Some(self.bodies.get(id)?.pose(&self.state).position)
+    }
+
+    /// Principal axes to world.
+    pub fn rotation(&self, id: BodyId) -> Option<DQuat> {
+        Some(self.bodies.get(id)?.pose(&self.state).rotation)
+    }
+
+    /// Of the centre of mass, m/s.
+    pub fn velocity(&self, id: BodyId) -> Option<DVec3> {
+        Some(self.bodies.get(id)?.twist(&self.state).linear)
+    }
+
+    /// In world axes, rad/s.
+    pub fn angular_velocity(&self, id: BodyId) -> Option<DVec3> {
+        Some(self.bodies.get(id)?.twist(&self.state).angular)
+    }
+
+    /// kg.
+    pub fn mass(&self, id: BodyId) -> Option<f64> {
+        Some(self.bodies.get(id)?.mass)
+    }
+
+    /// What snapshots call the body; never used twice.
+    pub fn serial(&self, id: BodyId) -> Option<u32> {
+        Some(self.bodies.get(id)?.serial)
+    }
+
+    /// Whether the body's state became non-finite and it was taken out of dynamics and collision.
+    pub fn is_quarantined(&self, id: BodyId) -> bool {
+        self.bodies.get(id).is_some_and(|body| body.quarantined)
+    }
+
+    /// Puts a body somewhere else; its contacts of the last tick are forgotten, and so is a quarantine.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, or a body that is gone.
+    pub fn set_pose(&mut self, id: BodyId, position: DVec3, rotation: DQuat) -> Result<(), SimError> {
+        require_vector(position, "position")?;
+        require_rotation(rotation, "rotation")?;
+        let body = self.bodies.get_mut(id).ok_or(SimError::Gone { what: "the body" })?;
+        body.set_pose(Pose { position, rotation: rotation.normalize() }, &mut self.state);
+        body.quarantined = false;
+        let serial = body.serial;
+        self.detector.forget_contacts(serial);
+        Ok(())
+    }
+
+    /// Sets velocity, m/s, and angular velocity, rad/s in world axes.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, or a body that is gone.
+    pub fn set_velocity(&mut self, id: BodyId, linear: DVec3, angular: DVec3) -> Result<(), SimError> {
+        require_vector(linear, "velocity")?;
+        require_vector(angular, "angular_velocity")?;
+        let body = self.bodies.get(id).ok_or(SimError::Gone { what: "the body" })?;
+        body.set_twist(Twist { linear, angular }, &mut self.state);
+        Ok(())
+    }
+
+    /// Pushes a body during the coming tick with `force`, N, at the world point `at`, m.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, or a body that is gone.
+    pub fn apply_force(&mut self, id: BodyId, force: DVec3, at: DVec3) -> Result<(), SimError> {
+        require_vector(force, "force")?;
+        require_vector(at, "at")?;
+        let body = self.bodies.get_mut(id).ok_or(SimError::Gone { what: "the body" })?;
+        let arm = at - body.pose(&self.state).position;
+        body.force += force;
+        body.torque += arm.cross(force);
+        Ok(())
+    }
+
+    /// Number of bodies.
+    pub fn body_count(&self) -> usize {
+        self.order.len()
+    }
+
+    /// All bodies, in order of serial.
+    pub fn bodies(&self) -> &[BodyId] {
+        &self.order
+    }
+
+    /// All slices of Q and Q', in order of serial.
+    pub fn slices(&self) -> impl Iterator<Item = SliceView<'_>> {
+        self.order.iter().map(|&id| {
+            let body = &self.bodies[id];
+            let (q, v) = (self.state.q(body.slice), self.state.v(body.slice));
+            SliceView { serial: body.serial, kind: body.kind, q, v }
+        })
+    }
+
+    /// Hash over every bit of Q and Q'.
+    pub fn state_hash(&self) -> u64 {
+        self.state.hash()
+    }
+
+    /// Energy now.
+    pub fn energy(&self) -> Energy {
+        let mut energy = Energy::default();
+        for body in self.bodies.values() {
+            let twist = body.twist(&self.state);
+            let spin = body.spin_momentum(&self.state);
+            energy.kinetic += 0.5 * (body.mass * twist.linear.length_squared() + spin.dot(twist.angular));
+            energy.gravitational -= body.mass * self.settings.gravity.dot(body.pose(&self.state).position);
+        }
+        for spring in self.potentials.springs.values() {
+            let stretch = (self.point(spring.b) - self.point(spring.a)).length() - spring.rest_length;
+            energy.elastic += 0.5 * spring.stiffness * stretch * stretch;
+        }
+        energy
+    }
+
+    /// Momentum now.
+    pub fn momentum(&self) -> Momentum {
+        let mut momentum = Momentum::default();
+        for body in self.bodies.values() {
+            let linear = body.mass * body.twist(&self.state).linear;
+            momentum.linear += linear;
+            momentum.angular += body.pose(&self.state).position.cross(linear) + body.spin_momentum(&self.state);
+        }
+        momentum
+    }
+
+    fn point(&self, anchor: Anchor) -> DVec3 {
+        let body = anchor.body.and_then(|id| self.bodies.get(id));
+        body.map_or(anchor.point, |body| body.pose(&self.state).point(anchor.point))
+    }
+
+    // --- stages ----------------------------------------------------------------------------------------------------
+
+    /// Stage 2: finds contacts at Q0.
+    pub fn detect_collisions(&mut self) {
+        let Self { bodies, state, order, detector, settings, .. } = self;
+        detector.detect(order, settings, |id| {
+            let body = &bodies[id];
+            let collider = body.collider.as_ref().filter(|_| !body.quarantined)?;
+            Some(Moving { serial: body.serial, collider, pose: body.pose(state), twist: body.twist(state) })
+        });
+    }
+
+    /// Stage 4: integrates all DOF over one tick.
+    pub fn integrate(&mut self) -> &StepReport {
+        let mut scene = Scene {
+            settings: &self.settings,
+            state: &mut self.state,
+            bodies: &mut self.bodies,
+            order: &self.order,
+            potentials: &mut self.potentials,
+            contacts: &mut self.detector.contacts,
+        };
+        self.report = self.integrator.step(&mut scene);
+        self.detector.remember();
+        &self.report
+    }
+
+    /// Stages 2 and 4, for worlds without game logic.
+    pub fn step(&mut self) -> &StepReport {
+        self.detect_collisions();
+        self.integrate()
+    }
+
+    /// What the last integration did.
+    pub fn report(&self) -> &StepReport {
+        &self.report
+    }
+
+    /// Contact points of the last tick, in a stable order.
+    pub fn contacts(&self) -> impl Iterator<Item = ContactView> + '_ {
+        self.detector.contacts.iter().filter_map(|c| {
+            let b = match c.b {
+                Partner::Body(serial) => Some(self.body_of(serial)?),
+                Partner::Static(_) => None,
+            };
+            let (point, normal, gap, normal_force) = (c.position, c.normal, c.gap, c.normal_force);
+            Some(ContactView { a: self.body_of(c.a)?, b, point, normal, gap, normal_force })
+        })
+    }
+
+    fn body_of(&self, serial: u32) -> Option<BodyId> {
+        let place = self.order.binary_search_by_key(&serial, |&id| self.bodies[id].serial).ok()?;
+        Some(self.order[place])
+    }
+}
