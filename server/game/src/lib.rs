@@ -1,1 +1,27 @@
 //! PITA's game: arenas and actors on the engine, and the pipeline that runs them.
+//!
+//! Owns: the five stages of a tick ([`pipeline`]), arenas and their files ([`arena`], [`arena_file`]), what acts in them
+//! ([`actor`], [`vehicle`], [`prop`], [`driver`]), and the controls that players send ([`controls`]). It may touch the
+//! engine, `pita-sim`, and nothing else: no clock, no disk, no network, no randomness. What a tick needs from outside
+//! comes in through [`Ports`].
+//!
+//! Axes: x forward, y up, z to the right; SI units; angles in radians, in arena files in degrees.
+//! Everything is ordered by id, slot or place in the file, so that the same file and the same commands give the same
+//! world, bit by bit.
+
+pub mod actor;
+pub mod arena;
+pub mod arena_file;
+pub mod controls;
+pub mod driver;
+pub mod pipeline;
+pub mod prop;
+pub mod spawn;
+pub mod vehicle;
+
+pub use actor::{Actor, ActorInfo, PartInfo};
+pub use arena::{Arena, ArenaEvent, ArenaSettings, Command, StaticInfo};
+pub use arena_file::ArenaError;
+pub use controls::Controls;
+pub use pipeline::{Ports, Stage};
+pub use spawn::Pose;

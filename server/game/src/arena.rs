@@ -1,0 +1,219 @@
+//! A running world with everything that acts in it.
+//!
+//! Owns the engine's [`World`], the actors, the slots and the events of a tick; each stage of the pipeline that is not
+//! the outside's is a method here. Reading it never changes it.
+
+mod build;
+mod players;
+
+use std::collections::BTreeMap;
+
+use glam::{DQuat, DVec3};
+use pita_sim::{Shape, World};
+
+use crate::Controls;
+use crate::actor::{Actor, ActorInfo, Step};
+use crate::pipeline::Ports;
+use crate::spawn::{self, Pose};
+use crate::vehicle::VehicleParameters;
+
+/// What the caller decides about an arena, not its file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ArenaSettings {
+    /// Ticks a second; the length of a tick is its inverse. 1 to 1000.
+    pub tick_hz: u16,
+    /// Threads of the engine. The result does not depend on it.
+    pub threads: usize,
+}
+
+/// What the outside asks of an arena.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Command {
+    /// A player takes a slot and gets a vehicle. Refusals come as [`ArenaEvent::Left`].
+    Enter {
+        /// Below [`Arena::max_players`]; whoever had it leaves first.
+        slot: u16,
+        /// Name to show.
+        name: String,
+    },
+    /// A player leaves, the vehicle with him.
+    Leave {
+        /// His slot; nothing happens where nobody has it.
+        slot: u16,
+        /// For people.
+        reason: String,
+    },
+    /// New controls for a player's vehicle; they hold until the next.
+    Drive {
+        /// His slot; nothing happens where nobody has it.
+        slot: u16,
+        /// The controls.
+        controls: Controls,
+    },
+}
+
+/// Something that happened in a tick.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ArenaEvent {
+    /// An actor is there now.
+    ActorAdded(ActorInfo),
+    /// The actor with this id and all its bodies are gone.
+    ActorRemoved(u32),
+    /// A player has a slot now.
+    Entered {
+        /// Slot.
+        slot: u16,
+        /// Name.
+        name: String,
+    },
+    /// A player has no slot any more, or did not get one.
+    Left {
+        /// Slot.
+        slot: u16,
+        /// For people.
+        reason: String,
+    },
+}
+
+/// A piece of geometry that never moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StaticInfo {
+    /// Shape in its own frame.
+    pub shape: Shape,
+    /// Where it stands, m.
+    pub position: DVec3,
+    /// Its frame to world.
+    pub rotation: DQuat,
+}
+
+/// A running world.
+pub struct Arena {
+    name: String,
+    title: String,
+    max_players: u16,
+    /// Length of a tick, s.
+    dt: f64,
+    ticks: u64,
+    world: World,
+    statics: Vec<StaticInfo>,
+    /// What falls below is put back, m.
+    floor: f64,
+    vehicle: VehicleParameters,
+    /// Never empty.
+    spawns: Vec<Pose>,
+    /// By id.
+    actors: BTreeMap<u32, Box<dyn Actor>>,
+    next_actor: u32,
+    /// Actor of each slot.
+    slots: BTreeMap<u16, u32>,
+    events: Vec<ArenaEvent>,
+    /// Kept from tick to tick for its memory.
+    commands: Vec<Command>,
+}
+
+impl Arena {
+    /// The arena that runs unless another is asked for.
+    pub const DEFAULT: &str = include_str!("../../../configs/arenas/proving-ground.toml");
+
+    /// Name in key expressions.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What a person calls it.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// Number of slots.
+    pub fn max_players(&self) -> u16 {
+        self.max_players
+    }
+
+    /// Ticks done.
+    pub fn tick(&self) -> u64 {
+        self.ticks
+    }
+
+    /// The engine's world.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// Everything that never moves, in the order of the file.
+    pub fn statics(&self) -> &[StaticInfo] {
+        &self.statics
+    }
+
+    /// Every actor, in order of id.
+    pub fn actors(&self) -> impl Iterator<Item = &ActorInfo> {
+        self.actors.values().map(|actor| actor.describe())
+    }
+
+    /// The actor of a slot.
+    pub fn actor_of(&self, slot: u16) -> Option<&ActorInfo> {
+        self.slots.get(&slot).and_then(|id| self.actors.get(id)).map(|actor| actor.describe())
+    }
+
+    /// What happened in the last tick, in order.
+    pub fn events(&self) -> &[ArenaEvent] {
+        &self.events
+    }
+
+    /// Stage 1: takes the commands that came in since the last tick and applies them.
+    pub(crate) fn collect_input(&mut self, ports: &mut impl Ports) {
+        self.events.clear();
+        let mut commands = std::mem::take(&mut self.commands);
+        ports.collect(self.ticks + 1, &mut commands);
+        for command in commands.drain(..) {
+            self.apply(command);
+        }
+        self.commands = commands;
+    }
+
+    /// Stage 2: finds the contacts of this tick.
+    pub(crate) fn detect_collisions(&mut self) {
+        self.world.detect_collisions();
+    }
+
+    /// Stage 3: puts back what got lost, then lets every actor act, in order of id.
+    pub(crate) fn run_logic(&mut self) {
+        self.place_lost_actors();
+        let mut step = Step { world: &mut self.world, dt: self.dt };
+        for actor in self.actors.values_mut() {
+            actor.step(&mut step);
+        }
+    }
+
+    /// Stage 4: one implicit step of the whole world.
+    pub(crate) fn integrate(&mut self) {
+        self.world.integrate();
+        self.ticks += 1;
+    }
+
+    /// Puts actors that fell out of the world, or whose bodies the engine has taken out of it, back to their home or to
+    /// a free spawn point.
+    fn place_lost_actors(&mut self) {
+        let lost: Vec<u32> = self.actors.iter().filter(|(_, a)| self.is_lost(a.as_ref())).map(|(&id, _)| id).collect();
+        for id in lost {
+            let free = spawn::choose(&self.spawns, &self.positions_but(id));
+            let Some(actor) = self.actors.get_mut(&id) else { continue };
+            let pose = actor.home().unwrap_or(free);
+            // Homes and spawn points are checked when the arena is built: the engine has no reason to refuse one.
+            let _refused = actor.place(&mut self.world, pose);
+        }
+    }
+
+    fn is_lost(&self, actor: &dyn Actor) -> bool {
+        actor.bodies().iter().any(|&body| {
+            let fell = self.world.position(body).is_none_or(|at| at.y < self.floor);
+            fell || self.world.is_quarantined(body)
+        })
+    }
+
+    /// Where every actor but `id` is.
+    fn positions_but(&self, id: u32) -> Vec<DVec3> {
+        let others = self.actors.iter().filter(|(other, _)| **other != id);
+        others.filter_map(|(_, actor)| self.world.position(actor.bodies()[0])).collect()
+    }
+}

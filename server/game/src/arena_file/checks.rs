@@ -1,0 +1,131 @@
+//! The ranges of an arena file, and that its names refer to something.
+
+use super::{ArenaError, ArenaFile, Key};
+
+/// Most statics, spawn points and props each, copies and grids counted.
+const THINGS_MAX: usize = 4_096;
+/// Most cars of the arena's own.
+const DRIVERS_MAX: usize = 256;
+/// Most corners of a route.
+const CORNERS_MAX: usize = 1_024;
+/// Farthest from the origin, m: beyond, single-precision positions on the wire lose a millimetre.
+const WORLD_MAX: f64 = 5_000.0;
+
+impl ArenaFile {
+    /// # Errors
+    /// [`ArenaError::OutOfRange`] for the first value that is not allowed.
+    pub(super) fn check(&self) -> Result<(), ArenaError> {
+        let in_name = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
+        let named = (1..=32).contains(&self.name.len()) && self.name.chars().all(in_name);
+        Key::new("name").require(named, &self.name, "1 to 32 of a-z 0-9 - _")?;
+        check_text(&Key::new("title"), &self.title, 64)?;
+        Key::new("max_players").count(self.max_players.into(), 1, 1_024, "players")?;
+        Key::new("gravity").number(self.gravity, 0.0, 100.0, "m/s^2")?;
+        Key::new("floor").number(self.floor, -WORLD_MAX, 0.0, "m")?;
+        for (name, material) in &self.materials {
+            material.check(&Key::new("materials").at(name))?;
+        }
+        self.vehicle.check(&Key::new("vehicle"))?;
+        self.check_statics()?;
+        self.check_spawns()?;
+        self.check_props()?;
+        self.check_routes()
+    }
+
+    fn check_statics(&self) -> Result<(), ArenaError> {
+        let statics = Key::new("statics");
+        statics.count(self.statics.len(), 0, THINGS_MAX, "entries")?;
+        for (i, file) in self.statics.iter().enumerate() {
+            let key = statics.index(i);
+            file.shape.check(&key.at("shape"))?;
+            self.check_material(&key, &file.material)?;
+            key.at("position").vector(file.position, WORLD_MAX)?;
+            file.angles().check(&key)?;
+        }
+        Ok(())
+    }
+
+    fn check_spawns(&self) -> Result<(), ArenaError> {
+        for (i, spawn) in self.spawns.iter().enumerate() {
+            let key = Key::new("spawns").index(i);
+            key.at("position").vector(spawn.position, WORLD_MAX)?;
+            key.at("yaw").number(spawn.yaw, -360.0, 360.0, "deg")?;
+        }
+        let mut points = self.spawns.len();
+        for (i, grid) in self.spawn_grids.iter().enumerate() {
+            let key = Key::new("spawn_grids").index(i);
+            key.at("center").vector(grid.center, WORLD_MAX)?;
+            key.at("yaw").number(grid.yaw, -360.0, 360.0, "deg")?;
+            for axis in 0..2 {
+                key.at("count").index(axis).count(grid.count[axis], 1, THINGS_MAX, "points")?;
+                key.at("spacing").index(axis).number(grid.spacing[axis], 0.0, 1_000.0, "m")?;
+            }
+            points += grid.count[0] * grid.count[1];
+            key.at("count").count(points, 1, THINGS_MAX, "spawn points in all")?;
+        }
+        Key::new("spawns").count(points, 1, THINGS_MAX, "spawn points, those of spawn_grids included")
+    }
+
+    fn check_props(&self) -> Result<(), ArenaError> {
+        let mut bodies = 0;
+        for (i, prop) in self.props.iter().enumerate() {
+            let key = Key::new("props").index(i);
+            check_text(&key.at("name"), &prop.name, 32)?;
+            key.at("shape").require(prop.shape.is_bounded(), "half_space", "box, ball, capsule or cylinder")?;
+            prop.shape.check(&key.at("shape"))?;
+            self.check_material(&key, &prop.material)?;
+            key.at("mass").number(prop.mass, 0.01, 1e6, "kg")?;
+            key.at("position").vector(prop.position, WORLD_MAX)?;
+            key.at("yaw").number(prop.yaw, -360.0, 360.0, "deg")?;
+            for axis in 0..3 {
+                key.at("copies").index(axis).count(prop.copies[axis], 1, THINGS_MAX, "copies")?;
+                key.at("spacing").index(axis).number(prop.spacing[axis], -1_000.0, 1_000.0, "m")?;
+            }
+            bodies += prop.copies.iter().product::<usize>();
+            key.at("copies").count(bodies, 1, THINGS_MAX, "props in all")?;
+        }
+        Ok(())
+    }
+
+    fn check_routes(&self) -> Result<(), ArenaError> {
+        for (name, route) in &self.routes {
+            let key = Key::new("routes").at(name).at("corners");
+            key.count(route.corners.len(), 2, CORNERS_MAX, "corners")?;
+            for (i, corner) in route.corners.iter().enumerate() {
+                let key = key.index(i);
+                corner.iter().enumerate().try_for_each(|(j, &x)| key.index(j).number(x, -WORLD_MAX, WORLD_MAX, "m"))?;
+            }
+        }
+        Key::new("drivers").count(self.drivers.len(), 0, DRIVERS_MAX, "entries")?;
+        for (i, driver) in self.drivers.iter().enumerate() {
+            let key = Key::new("drivers").index(i);
+            check_text(&key.at("name"), &driver.name, 32)?;
+            key.at("speed").number(driver.speed, 1.0, 100.0, "m/s")?;
+            let Some(route) = self.routes.get(&driver.route) else {
+                return key.at("route").require(false, &driver.route, &one_of("routes", self.routes.keys()));
+            };
+            key.at("start").count(driver.start, 0, route.corners.len() - 1, "")?;
+        }
+        Ok(())
+    }
+
+    fn check_material(&self, key: &Key, name: &str) -> Result<(), ArenaError> {
+        let allowed = one_of("materials", self.materials.keys());
+        key.at("material").require(self.materials.contains_key(name), name, &allowed)
+    }
+}
+
+fn check_text(key: &Key, text: &str, max: usize) -> Result<(), ArenaError> {
+    let printable = !text.trim().is_empty() && !text.chars().any(char::is_control);
+    let allowed = format!("1 to {max} bytes without control characters");
+    key.require(printable && text.len() <= max, format_args!("{text:?}"), &allowed)
+}
+
+fn one_of<'a>(table: &str, names: impl Iterator<Item = &'a String>) -> String {
+    let names: Vec<&str> = names.map(String::as_str).collect();
+    if names.is_empty() {
+        format!("a name from [{table}], which is empty")
+    } else {
+        format!("one of {}", names.join(", "))
+    }
+}

@@ -1,0 +1,165 @@
+//! The tables of an arena file, as serde reads them: types and defaults, no ranges.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use super::{Angles, Material, ShapeFile};
+use crate::vehicle::VehicleParameters;
+
+/// A whole file.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ArenaFile {
+    /// Name in key expressions.
+    pub name: String,
+    /// What a person calls it.
+    pub title: String,
+    /// Slots.
+    pub max_players: u16,
+    /// Acceleration downwards, m/s².
+    #[serde(default = "standard_gravity")]
+    pub gravity: f64,
+    /// What falls below this height is put back, m.
+    #[serde(default = "default_floor")]
+    pub floor: f64,
+    /// Surfaces, by name.
+    pub materials: BTreeMap<String, Material>,
+    /// Geometry that never moves.
+    #[serde(default)]
+    pub statics: Vec<StaticFile>,
+    /// Single spawn points.
+    #[serde(default)]
+    pub spawns: Vec<SpawnFile>,
+    /// Rectangles of spawn points.
+    #[serde(default)]
+    pub spawn_grids: Vec<SpawnGridFile>,
+    /// What everybody drives.
+    #[serde(default)]
+    pub vehicle: VehicleParameters,
+    /// Loose things.
+    #[serde(default)]
+    pub props: Vec<PropFile>,
+    /// Closed routes, by name.
+    #[serde(default)]
+    pub routes: BTreeMap<String, RouteFile>,
+    /// The arena's own cars.
+    #[serde(default)]
+    pub drivers: Vec<DriverFile>,
+}
+
+fn standard_gravity() -> f64 {
+    9.81
+}
+
+fn default_floor() -> f64 {
+    -20.0
+}
+
+/// A piece of static geometry.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StaticFile {
+    /// Its shape.
+    pub shape: ShapeFile,
+    /// Name of its material.
+    pub material: String,
+    /// Its centre, m.
+    #[serde(default)]
+    pub position: [f64; 3],
+    /// Deg, see [`Angles`].
+    #[serde(default)]
+    pub yaw: f64,
+    /// Deg.
+    #[serde(default)]
+    pub pitch: f64,
+    /// Deg.
+    #[serde(default)]
+    pub roll: f64,
+}
+
+impl StaticFile {
+    /// Its angles.
+    pub fn angles(&self) -> Angles {
+        Angles { yaw: self.yaw, pitch: self.pitch, roll: self.roll }
+    }
+}
+
+/// A spawn point.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpawnFile {
+    /// Point of the ground, m.
+    pub position: [f64; 3],
+    /// Heading, deg to the left of +x.
+    #[serde(default)]
+    pub yaw: f64,
+}
+
+/// A rectangle of spawn points around a centre.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpawnGridFile {
+    /// Point of the ground in the middle, m.
+    #[serde(default)]
+    pub center: [f64; 3],
+    /// Points along x and z.
+    pub count: [usize; 2],
+    /// Distance of neighbours along x and z, m.
+    pub spacing: [f64; 2],
+    /// Heading, deg to the left of +x.
+    #[serde(default)]
+    pub yaw: f64,
+}
+
+/// A loose thing, or a block of equal ones.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PropFile {
+    /// What a person calls it.
+    pub name: String,
+    /// Its shape.
+    pub shape: ShapeFile,
+    /// Name of its material.
+    pub material: String,
+    /// Kg.
+    pub mass: f64,
+    /// Centre of the first, m.
+    pub position: [f64; 3],
+    /// Heading, deg to the left of +x.
+    #[serde(default)]
+    pub yaw: f64,
+    /// How many along x, y and z.
+    #[serde(default = "one_of_each")]
+    pub copies: [usize; 3],
+    /// Distance of neighbours along x, y and z, m.
+    #[serde(default)]
+    pub spacing: [f64; 3],
+}
+
+fn one_of_each() -> [usize; 3] {
+    [1; 3]
+}
+
+/// A closed route.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RouteFile {
+    /// Its corners in x and z, m.
+    pub corners: Vec<[f64; 2]>,
+}
+
+/// A car that the arena drives.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriverFile {
+    /// What a person calls it.
+    pub name: String,
+    /// Name of its route.
+    pub route: String,
+    /// Corner at which it starts; it heads for the next.
+    #[serde(default)]
+    pub start: usize,
+    /// Wanted speed, m/s.
+    pub speed: f64,
+}

@@ -1,0 +1,138 @@
+//! Arena files, good and bad.
+
+use pita_game::vehicle::VehicleParameters;
+use pita_game::{Arena, ArenaError};
+
+use crate::test_track::{FLAT, SETTINGS};
+
+/// What loading `text` says.
+fn refusal(text: &str) -> String {
+    match Arena::from_toml(text, &SETTINGS) {
+        Ok(_) => "accepted".to_owned(),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn shipped_files_load() {
+    for text in [Arena::DEFAULT, FLAT] {
+        assert_eq!(refusal(text), "accepted");
+    }
+    let arena = Arena::from_toml(Arena::DEFAULT, &SETTINGS).expect("checked above");
+    assert_eq!((arena.name(), arena.title()), ("proving-ground", "Proving ground"));
+}
+
+/// Replacement in the flat arena's file, and what the error has to say.
+const BAD: &[(&str, &str, &[&str])] = &[
+    ("name = \"flat\"", "name = \"Flat Arena\"", &["name is Flat Arena", "1 to 32 of a-z 0-9 - _"]),
+    ("title = \"Flat ground\"", "title = \"\"", &["title", "1 to 64 bytes"]),
+    ("max_players = 64", "max_players = 0", &["max_players is 0", "1 to 1024 players"]),
+    ("max_players = 64", "max_players = 1025", &["max_players is 1025", "1 to 1024 players"]),
+    ("max_players = 64", "max_players = -1", &["line 5, column 15"]),
+    ("max_players = 64", "max_players = 64\ngravity = nan", &["gravity is NaN", "0 to 100 m/s^2"]),
+    ("max_players = 64", "max_players = 64\nfloor = 1.0", &["floor is 1", "-5000 to 0 m"]),
+    ("max_players = 64", "max_playerz = 64", &["line 5, column 1", "unknown field `max_playerz`", "max_players"]),
+    ("max_players = 64", "", &["missing field `max_players`"]),
+    ("friction = 1.0", "friction = -0.5", &["materials.asphalt.friction is -0.5", "0 to 5"]),
+    ("friction = 1.0", "friction = inf", &["materials.asphalt.friction is inf", "0 to 5"]),
+    ("friction = 1.0", "friction = \"much\"", &["line 8, column 12", "invalid type: string \"much\""]),
+    ("material = \"asphalt\"", "material = \"ice\"", &["statics[0].material is ice", "one of asphalt"]),
+    (
+        "shape.half_space = {}",
+        "shape.box.half = [1.0, 0.0, 1.0]",
+        &["statics[0].shape.box.half[1] is 0", "0.02 to 5000 m"],
+    ),
+    ("shape.half_space = {}", "shape.box.half = [1.0, 1.0]", &["line 11", "length 3"]),
+    ("shape.half_space = {}", "shape.cone.half = 1.0", &["line 11, column 7", "unknown variant `cone`"]),
+    ("shape.half_space = {}", "shape.ball.radius = nan", &["statics[0].shape.ball.radius is NaN", "0.02 to 5000 m"]),
+    (
+        "shape.half_space = {}",
+        "shape.half_space = {}\nposition = [0, 1e9, 0]",
+        &["statics[0].position[1]", "-5000 to 5000 m"],
+    ),
+    ("shape.half_space = {}", "shape.half_space = {}\npitch = 400", &["statics[0].pitch is 400", "-360 to 360 deg"]),
+    ("count = [8, 8]", "count = [0, 8]", &["spawn_grids[0].count[0] is 0", "1 to 4096 points"]),
+    ("count = [8, 8]", "count = [100, 100]", &["spawn_grids[0].count is 10000", "1 to 4096 spawn points"]),
+    ("spacing = [8.0, 6.0]", "spacing = [8.0, -6.0]", &["spawn_grids[0].spacing[1] is -6", "0 to 1000 m"]),
+    ("[[spawn_grids]]\ncount = [8, 8]\nspacing = [8.0, 6.0]", "", &["spawns is 0", "1 to 4096 spawn points"]),
+];
+
+#[test]
+fn a_bad_file_is_refused_with_key_value_and_range() {
+    let files = BAD.iter().map(|(good, bad, expected)| {
+        assert!(FLAT.contains(good), "{good} is not in the file any more");
+        (FLAT.replace(good, bad), *bad, *expected)
+    });
+    assert_refused(files);
+}
+
+/// Each of (text, what is bad in it, what the error has to say).
+fn assert_refused<'a>(files: impl Iterator<Item = (String, &'a str, &'a [&'a str])>) {
+    let mut wrong = String::new();
+    for (text, bad, expected) in files {
+        let said = refusal(&text);
+        for part in expected.iter().filter(|part| !said.contains(**part)) {
+            wrong += &format!("{bad}\nsaid:     {said}\nexpected: {part}\n\n");
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong}");
+}
+
+/// Text behind the flat arena's file, and what the error has to say.
+const BAD_ADDITIONS: &[(&str, &[&str])] = &[
+    ("[vehicle]\nchassis_mass = 0", &["vehicle.chassis_mass is 0", "50 to 50000 kg"]),
+    ("[vehicle]\nwheel_rounding = 0.5", &["vehicle.wheel_rounding is 0.5", "0 to 0.12 m"]),
+    ("[vehicle]\nwings = 2", &["unknown field `wings`"]),
+    ("[vehicle]\ndrive = \"sails\"", &["unknown variant `sails`", "`rear`"]),
+    ("[[spawns]]\nposition = [0, nan, 0]", &["spawns[0].position[1] is NaN", "-5000 to 5000 m"]),
+    (
+        "[[props]]\nname = \"x\"\nshape.half_space = {}\nmaterial = \"asphalt\"\nmass = 1\nposition = [0, 0, 0]",
+        &["props[0].shape is half_space", "box, ball, capsule or cylinder"],
+    ),
+    (
+        "[[props]]\nname = \"x\"\nshape.ball.radius = 1\nmaterial = \"asphalt\"\nmass = 1\nposition = [0, 0, 0]\ncopies = [4096, 4096, 4096]",
+        &["props[0].copies is 68719476736", "1 to 4096 props in all"],
+    ),
+    (
+        "[[drivers]]\nname = \"x\"\nroute = \"moon\"\nspeed = 9",
+        &["drivers[0].route is moon", "a name from [routes], which is empty"],
+    ),
+    ("[routes.a]\ncorners = [[0, 0]]", &["routes.a.corners is 1", "2 to 1024 corners"]),
+    (
+        "[routes.a]\ncorners = [[0, 0], [9, 0]]\n[[drivers]]\nname = \"x\"\nroute = \"a\"\nspeed = 9\nstart = 2",
+        &["drivers[0].start is 2", "0 to 1"],
+    ),
+    ("[[[", &["line 18, column 3"]),
+];
+
+#[test]
+fn a_bad_addition_is_refused_with_key_value_and_range() {
+    assert_refused(BAD_ADDITIONS.iter().map(|(bad, expected)| (format!("{FLAT}\n{bad}\n"), *bad, *expected)));
+}
+
+#[test]
+fn a_file_that_is_too_long_is_not_read() {
+    let said = refusal(&" ".repeat((1 << 20) + 1));
+    assert!(said.contains("length of the file is 1048577") && said.contains("1 to 1048576 bytes"), "{said}");
+}
+
+#[test]
+fn settings_are_checked_too() {
+    let settings = pita_game::ArenaSettings { tick_hz: 0, ..SETTINGS };
+    let Err(error) = Arena::from_toml(FLAT, &settings) else { panic!("accepted") };
+    assert!(matches!(&error, ArenaError::OutOfRange { key, .. } if key == "tick_hz"), "{error}");
+}
+
+#[test]
+fn the_default_arena_explains_every_key_of_the_vehicle() {
+    let all = toml::Table::try_from(VehicleParameters::default()).expect("plain numbers");
+    let section = Arena::DEFAULT.split("[vehicle]").nth(1).expect("there is one");
+    let section = section.split("# ---").next().expect("the first part");
+    for (key, value) in &all {
+        let line = section.lines().find(|line| line.split_whitespace().next() == Some(key));
+        let line = line.unwrap_or_else(|| panic!("{key} is not in the file"));
+        assert!(line.contains('#') && line.contains(':'), "{line} has no range");
+        let shipped: toml::Table = line.parse().expect("a line of the file that loads");
+        assert_eq!(shipped[key], *value, "{key} is said to be the default");
+    }
+}

@@ -1,0 +1,8 @@
+//! Tests of the game through its public interface: one binary, a module a subject.
+
+mod arena_files;
+mod driving;
+mod pipeline;
+mod players;
+mod reproducibility;
+mod test_track;
