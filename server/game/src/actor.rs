@@ -51,7 +51,12 @@ pub trait Actor: Send {
     fn control(&mut self, _controls: Controls) {}
 
     /// Stage 3: sets forces and actuators for this tick's integration.
-    fn step(&mut self, _step: &mut Step) {}
+    ///
+    /// # Errors
+    /// What the engine refused; the arena then puts the actor back.
+    fn step(&mut self, _step: &mut Step) -> Result<(), SimError> {
+        Ok(())
+    }
 
     /// Where it is put when it got lost; `None` for a free spawn point.
     fn home(&self) -> Option<Pose>;

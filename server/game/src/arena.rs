@@ -176,12 +176,18 @@ impl Arena {
         self.world.detect_collisions();
     }
 
-    /// Stage 3: puts back what got lost, then lets every actor act, in order of id.
+    /// Stage 3: puts back what got lost and lets every actor act, in order of id.
     pub(crate) fn run_logic(&mut self) {
-        self.place_lost_actors();
-        let mut step = Step { world: &mut self.world, dt: self.dt };
-        for actor in self.actors.values_mut() {
-            actor.step(&mut step);
+        let ids: Vec<u32> = self.actors.keys().copied().collect();
+        for id in ids {
+            if self.is_lost(id) {
+                self.put_back(id);
+            }
+            let Some(actor) = self.actors.get_mut(&id) else { continue };
+            let mut step = Step { world: &mut self.world, dt: self.dt };
+            if actor.step(&mut step).is_err() {
+                self.put_back(id);
+            }
         }
     }
 
@@ -191,24 +197,22 @@ impl Arena {
         self.ticks += 1;
     }
 
-    /// Puts actors that fell out of the world, or whose bodies the engine has taken out of it, back to their home or to
-    /// a free spawn point.
-    fn place_lost_actors(&mut self) {
-        let lost: Vec<u32> = self.actors.iter().filter(|(_, a)| self.is_lost(a.as_ref())).map(|(&id, _)| id).collect();
-        for id in lost {
-            let free = spawn::choose(&self.spawns, &self.positions_but(id));
-            let Some(actor) = self.actors.get_mut(&id) else { continue };
-            let pose = actor.home().unwrap_or(free);
-            // Homes and spawn points are checked when the arena is built: the engine has no reason to refuse one.
-            let _refused = actor.place(&mut self.world, pose);
-        }
-    }
-
-    fn is_lost(&self, actor: &dyn Actor) -> bool {
-        actor.bodies().iter().any(|&body| {
+    /// Whether an actor fell out of the world, or the engine took one of its bodies out of it.
+    fn is_lost(&self, id: u32) -> bool {
+        let bodies = self.actors.get(&id).map(|actor| actor.bodies()).unwrap_or_default();
+        bodies.iter().any(|&body| {
             let fell = self.world.position(body).is_none_or(|at| at.y < self.floor);
             fell || self.world.is_quarantined(body)
         })
+    }
+
+    /// Puts an actor back to its home or to a free spawn point.
+    fn put_back(&mut self, id: u32) {
+        let free = spawn::choose(&self.spawns, &self.positions_but(id));
+        let Some(actor) = self.actors.get_mut(&id) else { return };
+        let pose = actor.home().unwrap_or(free);
+        // Homes and spawn points are checked when the arena is built: the engine has no reason to refuse one.
+        let _refused = actor.place(&mut self.world, pose);
     }
 
     /// Where every actor but `id` is.

@@ -57,15 +57,15 @@ impl Vehicle {
     }
 
     /// Puts the car back on its wheels where it is, when the button goes down.
-    fn reset_if_asked(&mut self, step: &mut Step, motion: &Motion) {
+    fn reset_if_asked(&mut self, step: &mut Step, motion: &Motion) -> Result<(), SimError> {
         let asked = self.controls.reset && !self.reset_was_held;
         self.reset_was_held = self.controls.reset;
-        if asked {
-            let lift = RESET_LIFT - self.parameters.chassis_half[1];
-            let pose = Pose { position: motion.position + DVec3::Y * lift, yaw: motion.yaw() };
-            // The pose is finite because the motion is; a refusal would leave the car where it is, to be respawned.
-            let _refused = self.place(step.world, pose);
+        if !asked {
+            return Ok(());
         }
+        let lift = RESET_LIFT - self.parameters.chassis_half[1];
+        let pose = Pose { position: motion.position + DVec3::Y * lift, yaw: motion.yaw() };
+        self.place(step.world, pose)
     }
 
     /// What the axle of `wheel` is told, at the forward speed `speed` in m/s.
@@ -135,20 +135,20 @@ impl Actor for Vehicle {
         self.controls = controls.in_range();
     }
 
-    fn step(&mut self, step: &mut Step) {
-        let Some(motion) = Motion::of(step.world, self.bodies()[0]) else { return };
+    fn step(&mut self, step: &mut Step) -> Result<(), SimError> {
+        let chassis = self.bodies()[0];
+        let motion = Motion::of(step.world, chassis).ok_or(SimError::Gone { what: "the chassis" })?;
         if let Some(controls) = self.driver.decide(&motion, step.dt) {
             self.controls = controls;
         }
-        self.reset_if_asked(step, &motion);
+        self.reset_if_asked(step, &motion)?;
         let speed = motion.forward_speed();
         self.response.follow(&self.controls, &self.parameters, speed, step.dt);
         for wheel in WHEELS {
             let control = self.axle_control(wheel, speed);
-            if let Some(axle) = step.world.axle_mut(self.rig.axle(wheel)) {
-                *axle = control;
-            }
+            step.world.set_axle(self.rig.axle(wheel), control)?;
         }
+        Ok(())
     }
 
     fn home(&self) -> Option<Pose> {
