@@ -53,16 +53,49 @@ pub fn pack(
     q.chain(v).for_each(|x| out.extend_from_slice(&x.to_le_bytes()));
 }
 
-/// Reads all slices of a snapshot.
-///
-/// # Errors
-/// [`WireError::Malformed`] where the bytes end inside a slice, [`WireError::Content`] for a non-finite number, counts
-/// that do not fit a known kind, ids that do not ascend, or too many slices.
-pub fn unpack(mut bytes: &[u8]) -> Result<Vec<Slice>, WireError> {
-    let mut slices = Vec::new();
-    let mut last_id = None;
-    while !bytes.is_empty() {
-        let (head, rest) = bytes.split_first_chunk::<HEAD_BYTES>().ok_or(WireError::Malformed)?;
+/// One slice inside the bytes of a snapshot, its numbers still packed and known to be finite.
+#[derive(Clone, Copy, Debug)]
+pub struct PackedSlice<'a> {
+    /// [`Slice::id`].
+    pub id: u32,
+    /// [`Slice::kind`].
+    pub kind: u8,
+    q: &'a [u8],
+    v: &'a [u8],
+}
+
+impl<'a> PackedSlice<'a> {
+    /// Generalised positions, in the units of the kind.
+    pub fn q(&self) -> impl ExactSizeIterator<Item = f32> + 'a {
+        numbers(self.q)
+    }
+
+    /// Their rates, per second.
+    pub fn v(&self) -> impl ExactSizeIterator<Item = f32> + 'a {
+        numbers(self.v)
+    }
+}
+
+fn numbers(bytes: &[u8]) -> impl ExactSizeIterator<Item = f32> + '_ {
+    bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+}
+
+/// Walks the slices of a snapshot in order of id, without copying them; ends after the first error.
+#[derive(Clone, Debug)]
+pub struct PackedSlices<'a> {
+    rest: &'a [u8],
+    last_id: Option<u32>,
+    count: usize,
+}
+
+/// Slices of a snapshot, for a reader who wants a few of them.
+pub fn walk(bytes: &[u8]) -> PackedSlices<'_> {
+    PackedSlices { rest: bytes, last_id: None, count: 0 }
+}
+
+impl<'a> PackedSlices<'a> {
+    fn take_one(&mut self) -> Result<PackedSlice<'a>, WireError> {
+        let (head, rest) = self.rest.split_first_chunk::<HEAD_BYTES>().ok_or(WireError::Malformed)?;
         let [i0, i1, i2, i3, kind, n_q, n_v] = *head;
         let (id, n_q, n_v) = (u32::from_le_bytes([i0, i1, i2, i3]), usize::from(n_q), usize::from(n_v));
         let counts_fit = match kind {
@@ -71,18 +104,39 @@ pub fn unpack(mut bytes: &[u8]) -> Result<Vec<Slice>, WireError> {
             _ => true,
         };
         require(counts_fit, "slice counts", "3 and 3 for a particle, 7 and 6 for a rigid body")?;
-        require(last_id < Some(id), "slice id", "ascending")?;
-        require(slices.len() < SLICES_MAX, "slice count", "0 to 65536")?;
-        let (numbers, rest) = rest.split_at_checked(4 * (n_q + n_v)).ok_or(WireError::Malformed)?;
-        let mut numbers = numbers.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-        let q: Vec<f32> = numbers.by_ref().take(n_q).collect();
-        let v: Vec<f32> = numbers.collect();
-        require(q.iter().chain(&v).all(|x| x.is_finite()), "slice numbers", "finite")?;
-        slices.push(Slice { id, kind, q, v });
-        last_id = Some(id);
-        bytes = rest;
+        require(self.last_id < Some(id), "slice id", "ascending")?;
+        require(self.count < SLICES_MAX, "slice count", "0 to 65536")?;
+        let (body, rest) = rest.split_at_checked(4 * (n_q + n_v)).ok_or(WireError::Malformed)?;
+        require(numbers(body).all(f32::is_finite), "slice numbers", "finite")?;
+        let (q, v) = body.split_at(4 * n_q);
+        *self = Self { rest, last_id: Some(id), count: self.count + 1 };
+        Ok(PackedSlice { id, kind, q, v })
     }
-    Ok(slices)
+}
+
+impl<'a> Iterator for PackedSlices<'a> {
+    type Item = Result<PackedSlice<'a>, WireError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.rest.is_empty() {
+            return None;
+        }
+        let slice = self.take_one();
+        if slice.is_err() {
+            self.rest = &[];
+        }
+        Some(slice)
+    }
+}
+
+/// Reads all slices of a snapshot.
+///
+/// # Errors
+/// [`WireError::Malformed`] where the bytes end inside a slice, [`WireError::Content`] for a non-finite number, counts
+/// that do not fit a known kind, ids that do not ascend, or too many slices.
+pub fn unpack(bytes: &[u8]) -> Result<Vec<Slice>, WireError> {
+    let owned = |s: PackedSlice| Slice { id: s.id, kind: s.kind, q: s.q().collect(), v: s.v().collect() };
+    walk(bytes).map(|slice| slice.map(owned)).collect()
 }
 
 #[cfg(test)]
