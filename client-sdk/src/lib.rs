@@ -1,1 +1,42 @@
-//! Skeleton.
+//! PITA's client: connect to a server, drive, and see what happens.
+//!
+//! A [`Session`] is one player or spectator over a Zenoh connection of its own. It keeps the newest
+//! [snapshot](ReceivedSnapshot), the [roster](Roster) of actors and [counts](Statistics) up to date in the background,
+//! and interpolates between snapshots on request. [`bots`] are sessions that drive themselves.
+//!
+//! Owns everything between the wire and a game's own code. It knows the protocol crate and no engine. What arrives is
+//! untrusted: it is checked, counted where it is of no use, and never takes more than bounded memory.
+//!
+//! ```no_run
+#![doc = include_str!("../examples/drive.rs")]
+//! ```
+
+pub mod bots;
+mod builder;
+mod error;
+mod events;
+mod inbox;
+mod interpolation;
+mod keeper;
+mod lock;
+mod outbox;
+mod roster;
+mod session;
+mod snapshot;
+mod statistics;
+mod tick_clock;
+mod tick_ledger;
+mod transport;
+mod wire;
+
+pub use builder::SessionBuilder;
+pub use error::{ClientError, SessionEnd};
+pub use events::SessionEvent;
+pub use interpolation::{Frame, InterpolationBuffer, InterpolationSettings};
+pub use roster::Roster;
+pub use session::{Session, WorldState};
+pub use snapshot::ReceivedSnapshot;
+pub use statistics::{Durations, Statistics};
+
+pub use pita_protocol::message::{ActorDescription, Controls, Description, Event, buttons};
+pub use pita_protocol::slices::{PackedSlice, Slice};

@@ -1,0 +1,114 @@
+//! One bot at work: sends on an absolute schedule until it is stopped or its session ends.
+
+use std::{
+    sync::{Arc, Mutex},
+    time::Duration,
+};
+
+use glam::Vec3;
+use pita_protocol::message::Controls;
+use tokio::{
+    sync::watch,
+    time::{Instant, sleep_until},
+};
+
+use super::{Script, View, recovery::Recovery};
+use crate::{
+    ClientError, Session, SessionEnd,
+    lock::lock,
+    statistics::{Durations, durations},
+};
+
+/// A car cannot drive so far between two snapshots that its bot sees, m: it was put somewhere else.
+const DRIVEN_AT_ONCE_MAX: f32 = 10.0;
+
+/// What a bot measures about itself.
+#[derive(Debug)]
+pub struct Meter {
+    /// Path of the car's root body, m.
+    pub distance_m: f64,
+    /// From when an input was due to when it was sent, µs.
+    pub lateness_us: Durations,
+    /// Inputs that were left out because they were late by a whole tick or more.
+    pub inputs_skipped: u64,
+    /// Why the bot's session ended before it was stopped.
+    pub lost: Option<SessionEnd>,
+}
+
+impl Meter {
+    /// Of a bot that has not driven yet.
+    pub fn new() -> Self {
+        Self { distance_m: 0.0, lateness_us: durations(), inputs_skipped: 0, lost: None }
+    }
+}
+
+/// A session, what drives it, and where it has got to.
+pub struct Driver {
+    session: Session,
+    actor: u32,
+    script: Box<dyn Script>,
+    recovery: Recovery,
+    meter: Arc<Mutex<Meter>>,
+    last: Option<Vec3>,
+}
+
+impl Driver {
+    /// Drives `session`, whose own car is `actor`.
+    pub fn new(session: Session, actor: u32, script: Box<dyn Script>, meter: Arc<Mutex<Meter>>) -> Self {
+        Self { session, actor, script, recovery: Recovery::default(), meter, last: None }
+    }
+
+    /// Drives until `stop` turns true or the session ends; leaves in either case. The first input is due after
+    /// `phase`, so that many bots do not all send at the same instant.
+    pub async fn run(mut self, phase: Duration, mut stop: watch::Receiver<bool>) {
+        let period = Duration::from_secs_f64(1.0 / f64::from(self.session.tick_hz()));
+        let mut due = Instant::now() + phase;
+        loop {
+            tokio::select! {
+                biased;
+                // An error means that the fleet is gone, which stops its bots too.
+                _ = stop.wait_for(|&stop| stop) => break,
+                () = sleep_until(due) => {}
+            }
+            due = self.note_lateness(due, period) + period;
+            let controls = self.controls();
+            match self.session.send(controls).await {
+                Ok(_) => {}
+                Err(ClientError::Ended(end)) => {
+                    lock(&self.meter).lost = Some(end);
+                    break;
+                }
+                Err(error) => tracing::warn!("bot in slot {}: {error}", self.session.slot()),
+            }
+        }
+        self.session.leave().await;
+    }
+
+    /// Records how late an input is, and answers when it was due: inputs that are late by whole ticks are left out,
+    /// and the schedule stays what it was.
+    fn note_lateness(&self, due: Instant, period: Duration) -> Instant {
+        let late = due.elapsed();
+        let skipped = (late.as_nanos() / period.as_nanos().max(1)).min(u128::from(u32::MAX)) as u32;
+        let mut meter = lock(&self.meter);
+        meter.lateness_us.saturating_record(u64::try_from(late.as_micros()).unwrap_or(u64::MAX));
+        meter.inputs_skipped += u64::from(skipped);
+        due + period * skipped
+    }
+
+    /// Neutral while there is nothing to see.
+    fn controls(&mut self) -> Controls {
+        let Some(snapshot) = self.session.latest_snapshot() else { return Controls::default() };
+        let roster = self.session.roster();
+        let Ok(Some(view)) = View::of(&snapshot, &roster, self.actor) else { return Controls::default() };
+        self.measure(view.own.position);
+        let wanted = self.script.drive(&view, snapshot.tick());
+        self.recovery.drive(&view.own, wanted)
+    }
+
+    fn measure(&mut self, position: Vec3) {
+        let driven = self.last.replace(position).map_or(0.0, |last| position.distance(last));
+        if driven < DRIVEN_AT_ONCE_MAX {
+            lock(&self.meter).distance_m += f64::from(driven);
+        }
+    }
+}

@@ -1,0 +1,304 @@
+//! A session: one player or spectator in one arena.
+
+use std::{
+    sync::{Arc, Mutex},
+    time::{Duration, Instant},
+};
+
+use pita_protocol::{
+    message::{Controls, Description, JoinAccepted},
+    slices::Slice,
+};
+use tokio::{sync::watch, task::JoinHandle, time::timeout};
+use zenoh::{liveliness::LivelinessToken, pubsub::Subscriber};
+
+use crate::{
+    builder::SessionBuilder,
+    error::{ClientError, SessionEnd},
+    events::{EventQueue, SessionEvent},
+    inbox::Inbox,
+    interpolation::{Frame, InterpolationBuffer},
+    lock::lock,
+    roster::Roster,
+    snapshot::ReceivedSnapshot,
+    statistics::Statistics,
+    transport,
+    wire::Wire,
+};
+
+/// How long [`Session::leave`] waits for the server's word that the session is over. Closing the connection at once
+/// could drop the message that says so.
+const LEAVE_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// A delay and the buffer that is read so far behind the newest state.
+type Interpolation = (Duration, Mutex<InterpolationBuffer>);
+
+/// What Zenoh's threads, the keeper and the owner of a session have in common. Locks are held for short computations
+/// only, never across an await.
+#[derive(Debug)]
+pub struct Shared {
+    pub(crate) inbox: Mutex<Inbox>,
+    pub(crate) events: EventQueue,
+    roster: Mutex<Arc<Roster>>,
+    newest: watch::Sender<Option<Arc<ReceivedSnapshot>>>,
+    end: watch::Sender<Option<SessionEnd>>,
+    interpolation: Option<Interpolation>,
+}
+
+impl Shared {
+    pub(crate) fn new(accepted: &JoinAccepted, recent_max: usize, interpolation: Option<Interpolation>) -> Self {
+        let description = &accepted.description;
+        Self {
+            inbox: Mutex::new(Inbox::new(accepted.tick_hz, description.tick, recent_max, Instant::now())),
+            events: EventQueue::default(),
+            roster: Mutex::new(Arc::new(Roster::new(description))),
+            newest: watch::Sender::new(None),
+            end: watch::Sender::new(None),
+            interpolation,
+        }
+    }
+
+    pub(crate) fn take_snapshot(&self, bytes: &[u8], now: Instant) {
+        let newest = lock(&self.inbox).take_snapshot(bytes, now);
+        if newest.is_some() {
+            self.newest.send_replace(newest);
+        }
+    }
+
+    pub(crate) fn newest(&self) -> Option<Arc<ReceivedSnapshot>> {
+        self.newest.borrow().clone()
+    }
+
+    pub(crate) fn roster(&self) -> Arc<Roster> {
+        Arc::clone(&lock(&self.roster))
+    }
+
+    /// Changes the roster; those who hold an earlier one keep it as it was.
+    pub(crate) fn with_roster<T>(&self, change: impl FnOnce(&mut Roster) -> T) -> T {
+        change(Arc::make_mut(&mut lock(&self.roster)))
+    }
+
+    pub(crate) fn end(&self) -> Option<SessionEnd> {
+        self.end.borrow().clone()
+    }
+
+    /// The first end counts.
+    pub(crate) fn finish(&self, end: SessionEnd) {
+        self.end.send_if_modified(|present| {
+            let first = present.is_none();
+            present.get_or_insert(end);
+            first
+        });
+        self.events.close();
+    }
+}
+
+/// The counts of a session that somebody else owns.
+#[derive(Debug)]
+pub(crate) struct StatisticsReader(Arc<Shared>);
+
+impl StatisticsReader {
+    pub(crate) fn read(&self) -> Statistics {
+        lock(&self.0.inbox).statistics()
+    }
+}
+
+/// The state of the world between two ticks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WorldState {
+    /// Fractional tick that is shown.
+    pub tick: f64,
+    /// In order of id.
+    pub slices: Vec<Slice>,
+}
+
+/// One player or spectator in one arena, over a connection of its own.
+///
+/// All methods take `&self`: one task may send while another one draws. Dropping a session closes its connection, and
+/// the server then takes the player out as lost; [`Session::leave`] says good-bye first.
+#[derive(Debug)]
+pub struct Session {
+    zenoh: zenoh::Session,
+    accepted: JoinAccepted,
+    shared: Arc<Shared>,
+    wire: Arc<Wire>,
+    next: tokio::sync::Mutex<watch::Receiver<Option<Arc<ReceivedSnapshot>>>>,
+    keeper: JoinHandle<()>,
+    _declared: Declared,
+}
+
+/// What is declared for as long as the session lives.
+pub(crate) type Declared = (Subscriber<()>, Subscriber<()>, LivelinessToken);
+
+impl Session {
+    /// Connects to `endpoint` (`tcp/HOST:PORT`) and joins the arena there as a player called `name`.
+    ///
+    /// # Errors
+    /// As [`SessionBuilder::connect`].
+    pub async fn connect(endpoint: &str, name: &str) -> Result<Self, ClientError> {
+        Self::builder(endpoint, name).connect().await
+    }
+
+    /// For everything that [`Session::connect`] does not ask.
+    pub fn builder(endpoint: &str, name: &str) -> SessionBuilder {
+        SessionBuilder::new(endpoint, name)
+    }
+
+    pub(crate) fn new(
+        zenoh: zenoh::Session,
+        accepted: JoinAccepted,
+        shared: Arc<Shared>,
+        wire: Arc<Wire>,
+        keeper: JoinHandle<()>,
+        declared: Declared,
+    ) -> Self {
+        let next = tokio::sync::Mutex::new(shared.newest.subscribe());
+        Self { zenoh, accepted, shared, wire, next, keeper, _declared: declared }
+    }
+
+    /// Number of the session's place on the server.
+    pub fn slot(&self) -> u16 {
+        self.accepted.slot
+    }
+
+    /// The session's own actor; `None` for a spectator.
+    pub fn actor(&self) -> Option<u32> {
+        self.accepted.actor
+    }
+
+    /// The arena as it was at the join. Its statics never change; for its actors see [`Session::roster`].
+    pub fn description(&self) -> &Description {
+        &self.accepted.description
+    }
+
+    /// Ticks a second.
+    pub fn tick_hz(&self) -> u16 {
+        self.accepted.tick_hz
+    }
+
+    /// The actors as they are now.
+    pub fn roster(&self) -> Arc<Roster> {
+        self.shared.roster()
+    }
+
+    /// Sends `controls` for the coming tick, with the last few before them in case those were lost, and acknowledges
+    /// the newest snapshot. Answers the sequence number under which [`ReceivedSnapshot::ack`] will confirm them. Meant
+    /// to be called once a tick; the server ends a session that stays silent for too long.
+    ///
+    /// # Errors
+    /// [`ClientError::BadArgument`] naming a control that is out of range, [`ClientError::Spectator`],
+    /// [`ClientError::Ended`], [`ClientError::Transport`].
+    pub async fn send(&self, controls: Controls) -> Result<u32, ClientError> {
+        if self.accepted.actor.is_none() {
+            return Err(ClientError::Spectator);
+        }
+        if let Some(end) = self.end() {
+            return Err(end.into());
+        }
+        self.wire.send(controls, false).await
+    }
+
+    /// The newest snapshot, if one has arrived.
+    pub fn latest_snapshot(&self) -> Option<Arc<ReceivedSnapshot>> {
+        self.shared.newest()
+    }
+
+    /// Waits for a snapshot that is newer than the one this answered last. Who reads too slowly misses some, and always
+    /// gets the newest.
+    ///
+    /// # Errors
+    /// How the session ended, once it has.
+    pub async fn next_snapshot(&self) -> Result<Arc<ReceivedSnapshot>, SessionEnd> {
+        let mut next = self.next.lock().await;
+        let mut end = self.shared.end.subscribe();
+        tokio::select! {
+            biased;
+            end = ended(&mut end) => Err(end),
+            snapshot = newer(&mut next) => Ok(snapshot),
+        }
+    }
+
+    /// The world as it is to be shown at `now`: some [delay](crate::InterpolationSettings::delay) behind the server,
+    /// interpolated between snapshots. `None` before the first snapshot, and for a session built without
+    /// interpolation.
+    pub fn world_at(&self, now: Instant) -> Option<WorldState> {
+        let (delay, buffer) = self.shared.interpolation.as_ref()?;
+        let (recent, tick) = {
+            let mut inbox = lock(&self.shared.inbox);
+            (inbox.drain_recent(), inbox.tick_at(now))
+        };
+        let mut buffer = lock(buffer);
+        for snapshot in recent {
+            // One that cannot be read has been counted, and is a gap like a lost one.
+            if let Ok(slices) = snapshot.slices() {
+                buffer.insert(Frame { tick: snapshot.tick(), slices });
+            }
+        }
+        let tick = (tick? - delay.as_secs_f64() * f64::from(self.tick_hz())).max(0.0);
+        Some(WorldState { tick, slices: buffer.sample(tick)? })
+    }
+
+    /// Waits for the next event. `None` once the session has ended and all events have been read.
+    pub async fn next_event(&self) -> Option<SessionEvent> {
+        self.shared.events.next().await
+    }
+
+    /// How the session ended, if it has.
+    pub fn end(&self) -> Option<SessionEnd> {
+        self.shared.end()
+    }
+
+    /// All counts since the session began.
+    pub fn statistics(&self) -> Statistics {
+        lock(&self.shared.inbox).statistics()
+    }
+
+    /// Reads the counts, also while somebody else owns the session and after it has gone.
+    pub(crate) fn statistics_reader(&self) -> StatisticsReader {
+        StatisticsReader(Arc::clone(&self.shared))
+    }
+
+    /// Says good-bye, waits until the server has taken the player out, and closes the connection. Takes at most a few
+    /// seconds, whatever the server does.
+    pub async fn leave(self) -> Statistics {
+        if self.end().is_none() {
+            match self.wire.send(Controls::default(), true).await {
+                Ok(_) => self.wait_until_left().await,
+                Err(error) => tracing::debug!("leaving: {error}"),
+            }
+        }
+        transport::close(&self.zenoh).await;
+        self.statistics()
+    }
+
+    async fn wait_until_left(&self) {
+        let mut end = self.shared.end.subscribe();
+        if timeout(LEAVE_TIMEOUT, ended(&mut end)).await.is_err() {
+            tracing::debug!("the server did not confirm within {LEAVE_TIMEOUT:?} that slot {} left", self.slot());
+        }
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.keeper.abort();
+    }
+}
+
+async fn ended(end: &mut watch::Receiver<Option<SessionEnd>>) -> SessionEnd {
+    match end.wait_for(Option::is_some).await {
+        Ok(end) => end.clone().unwrap_or(SessionEnd::Lost { silent_for: Duration::ZERO }),
+        Err(_) => std::future::pending().await,
+    }
+}
+
+async fn newer(next: &mut watch::Receiver<Option<Arc<ReceivedSnapshot>>>) -> Arc<ReceivedSnapshot> {
+    loop {
+        if next.changed().await.is_err() {
+            return std::future::pending().await;
+        }
+        if let Some(snapshot) = next.borrow_and_update().clone() {
+            return snapshot;
+        }
+    }
+}

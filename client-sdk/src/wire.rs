@@ -1,0 +1,67 @@
+//! Sending side of a session: seals and puts input packets.
+
+use std::{
+    sync::{Arc, Mutex},
+    time::Instant,
+};
+
+use pita_protocol::{
+    Keys,
+    message::{Controls, JoinAccepted},
+    seal::{SessionKey, seal},
+};
+use zenoh::{
+    pubsub::Publisher,
+    qos::{CongestionControl, Priority},
+};
+
+use crate::{error::ClientError, lock::lock, outbox::Outbox, session::Shared};
+
+/// Sends the inputs of one session.
+#[derive(Debug)]
+pub struct Wire {
+    publisher: Publisher<'static>,
+    key_expr: String,
+    session_key: SessionKey,
+    outbox: Mutex<Outbox>,
+    shared: Arc<Shared>,
+}
+
+impl Wire {
+    /// Declares the publisher of the session's inputs.
+    pub async fn open(
+        zenoh: &zenoh::Session,
+        keys: &Keys,
+        accepted: &JoinAccepted,
+        shared: Arc<Shared>,
+    ) -> Result<Self, ClientError> {
+        let key_expr = keys.input(accepted.slot);
+        let publisher = zenoh
+            .declare_publisher(key_expr.clone())
+            .congestion_control(CongestionControl::Drop)
+            .priority(Priority::InteractiveHigh)
+            .express(true)
+            .await
+            .map_err(ClientError::transport("declare the input publisher"))?;
+        let outbox = Mutex::new(Outbox::new(accepted.epoch));
+        Ok(Self { publisher, key_expr, session_key: accepted.session_key.clone(), outbox, shared })
+    }
+
+    /// Sends `controls` for the tick that the server is about to run; answers their sequence number.
+    pub async fn send(&self, controls: Controls, leave: bool) -> Result<u32, ClientError> {
+        controls.validate().map_err(ClientError::BadArgument)?;
+        let now = Instant::now();
+        let (newest, tick) = {
+            let inbox = lock(&self.shared.inbox);
+            let newest = inbox.newest_tick();
+            // Before the first snapshot the tick of the join is the best that is known.
+            let estimate = inbox.tick_at(now).map_or(newest, |tick| tick as u64);
+            (newest, estimate.max(newest).saturating_add(1))
+        };
+        let (sequence, packet) = lock(&self.outbox).packet(controls, tick, newest, leave);
+        let sealed = seal(&packet, &self.session_key, &self.key_expr);
+        lock(&self.shared.inbox).note_sent(sequence, sealed.len(), now);
+        self.publisher.put(sealed).await.map_err(ClientError::transport("send input"))?;
+        Ok(sequence)
+    }
+}
