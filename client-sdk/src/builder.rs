@@ -142,8 +142,7 @@ impl SessionBuilder {
     }
 
     async fn find_arena(&self, zenoh: &zenoh::Session) -> Result<String, ClientError> {
-        let running: Vec<Status> =
-            transport::ask_all(zenoh, keys::ANY_STATUS, "status", self.connect_timeout).await?;
+        let running: Vec<Status> = transport::ask_all(zenoh, keys::ANY_STATUS, "status", self.connect_timeout).await?;
         let mut names: Vec<String> = running.into_iter().map(|status| status.arena).collect();
         names.sort_unstable();
         names.dedup();
@@ -161,9 +160,9 @@ impl SessionBuilder {
 
     fn shared(&self, accepted: &JoinAccepted) -> Shared {
         let period_s = 1.0 / f64::from(accepted.tick_hz);
-        let interpolation = self.interpolation.map(|settings| {
-            (settings.delay, Mutex::new(InterpolationBuffer::new(settings, period_s)))
-        });
+        let interpolation = self
+            .interpolation
+            .map(|settings| (settings.delay, Mutex::new(InterpolationBuffer::new(settings, period_s))));
         let recent_max = self.interpolation.map_or(0, |settings| settings.frames_max.clamp(2, 256));
         Shared::new(accepted, recent_max, interpolation)
     }

@@ -1,9 +1,6 @@
 //! What a session tells its owner, in a bounded queue.
 
-use std::{
-    collections::VecDeque,
-    sync::Mutex,
-};
+use std::{collections::VecDeque, sync::Mutex};
 
 use pita_protocol::message::Event;
 use tokio::sync::Notify;

@@ -286,9 +286,11 @@ impl Drop for Session {
 }
 
 async fn ended(end: &mut watch::Receiver<Option<SessionEnd>>) -> SessionEnd {
-    match end.wait_for(Option::is_some).await {
-        Ok(end) => end.clone().unwrap_or(SessionEnd::Lost { silent_for: Duration::ZERO }),
-        Err(_) => std::future::pending().await,
+    let told = end.wait_for(Option::is_some).await.ok().and_then(|end| end.clone());
+    match told {
+        Some(end) => end,
+        // The sender lives as long as the session, so this is not reached while anybody waits.
+        None => std::future::pending().await,
     }
 }
 

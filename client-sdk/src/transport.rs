@@ -109,9 +109,7 @@ async fn pose(
 
 fn read<M: Message>(question: &'static str, reply: &Reply) -> Result<M, ClientError> {
     match reply.result() {
-        Ok(sample) => {
-            pita_protocol::decode(&sample.payload().to_bytes()).map_err(|e| ClientError::answer(question, e))
-        }
+        Ok(sample) => pita_protocol::decode(&sample.payload().to_bytes()).map_err(|e| ClientError::answer(question, e)),
         Err(_) => Err(ClientError::BadAnswer { question, error: WireError::Malformed }),
     }
 }

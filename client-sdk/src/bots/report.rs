@@ -52,8 +52,19 @@ impl Report {
         let mut table = Table::new();
         table.load_style(UTF8_FULL_CONDENSED);
         table.set_header([
-            "script", "bots", "lost", "snapshots", "missed", "min m", "mean m", "effect p50 ms", "p99 ms",
-            "late p50 ms", "p99 ms", "in kB/s", "out kB/s",
+            "script",
+            "bots",
+            "lost",
+            "snapshots",
+            "missed",
+            "min m",
+            "mean m",
+            "effect p50 ms",
+            "p99 ms",
+            "late p50 ms",
+            "p99 ms",
+            "in kB/s",
+            "out kB/s",
         ]);
         for (name, tally) in self.rows() {
             table.add_row(cells(name, &tally, self.tally.elapsed));

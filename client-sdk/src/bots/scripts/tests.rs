@@ -122,8 +122,7 @@ fn the_same_seed_wanders_the_same_way() {
 #[test]
 fn the_chase_reaches_the_nearest_and_lets_go() {
     let cars = vec![Car::at(0.0, 0.0), Car::at(30.0, 40.0), Car::at(-90.0, 0.0)];
-    let scripts: Vec<Box<dyn Script>> =
-        vec![ScriptKind::Chase.script(5), Box::new(Parked), Box::new(Parked)];
+    let scripts: Vec<Box<dyn Script>> = vec![ScriptKind::Chase.script(5), Box::new(Parked), Box::new(Parked)];
     let (mut nearest, mut last) = (f32::MAX, 0.0);
     drive(cars, scripts, 900, |cars| {
         let distance = cars[0].position.distance(cars[1].position);
