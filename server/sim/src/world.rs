@@ -144,8 +144,9 @@ impl World {
     ) -> BodyId {
         let (slice, serial) = (self.state.allocate(size.0, size.1), self.serials);
         self.serials += 1;
-        let (force, torque, index, quarantined) = (DVec3::ZERO, DVec3::ZERO, ABSENT, false);
-        let body = Body { kind, slice, serial, mass, inertia, collider, force, torque, index, quarantined };
+        let (force, torque, index) = (DVec3::ZERO, DVec3::ZERO, ABSENT);
+        let (is_wheel, quarantined) = (false, false);
+        let body = Body { kind, slice, serial, mass, inertia, collider, force, torque, index, is_wheel, quarantined };
         let id = self.bodies.insert(body);
         self.order.push(id);
         id
@@ -203,6 +204,7 @@ impl World {
             return Err(SimError::Unusable { what: "an axle needs two different rigid bodies" });
         }
         self.detector.exclude(chassis.serial, wheel.serial);
+        self.bodies[desc.wheel].is_wheel = true;
         Ok(self.potentials.axles.insert(desc))
     }
 

@@ -119,6 +119,7 @@ fn reset_puts_an_overturned_car_on_its_wheels_where_it_is() {
     let roof = "\n[vehicle]\nsteer_acceleration = 100.0\ntyre_friction = 3.0\n";
     let mut track = TestTrack::new(&format!("{spawn}{roof}"), SETTINGS);
     track.enter(0);
+    track.tick();
     track.run_until(10.0, FULL_THROTTLE, |t| t.speed() > 25.0);
     track.run_until(10.0, Controls { steer: 1.0, ..Controls::default() }, |t| t.car(0).upright() < 0.2);
     track.run_until(20.0, Controls::default(), |t| t.speed() < 0.1);

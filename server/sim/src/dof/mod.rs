@@ -83,6 +83,8 @@ pub(crate) struct Body {
     pub torque: DVec3,
     /// Its index among the bodies that take part in this tick; [`ABSENT`] where it does not.
     pub index: u32,
+    /// An axle carries it: it spins about its own z axis, and what turns that axis is the axle.
+    pub is_wheel: bool,
     /// Its state became non-finite: it stays where it last was sane, outside dynamics and collision.
     pub quarantined: bool,
 }
@@ -128,13 +130,17 @@ impl Pose {
 /// without any torque, and only the rest of the rotation is unknown, R1 = exp(dt (u_angular − free_spin)) R*. With the
 /// inertia frozen at R* the residual is the gradient of a convex kinetic term, angular momentum is exact and free spin
 /// loses no energy (DESIGN, section 3).
+///
+/// A wheel's axis is held by its axle, so the free motion of that axis, a nutation of up to 2 rad a tick, is a wrong
+/// guess from which Newton does not come back. There R* = R0, and R1 = exp(dt (u − spin)) exp(dt spin) R0 with spin the
+/// part of u along the axis: the axis is a smooth function of what turns it, however fast the wheel spins up.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Node {
     /// Pose at the start of the tick.
     pub start: Pose,
-    /// Rotation after the tick without torque.
+    /// Rotation after the tick without torque; of a wheel, at its start.
     pub free_rotation: DQuat,
-    /// Angular velocity at `free_rotation` without torque, rad/s.
+    /// Angular velocity that leads to `free_rotation`, rad/s; zero for a wheel.
     pub free_spin: DVec3,
     /// Twist at the end of the tick under gravity and outer forces alone.
     pub target: Twist,
@@ -146,6 +152,8 @@ pub(crate) struct Node {
     /// Its inverse.
     pub inverse_inertia: DMat3,
     pub rotates: bool,
+    /// Axis of a wheel at the start of the tick.
+    pub wheel_axis: Option<DVec3>,
 }
 
 impl Node {
@@ -155,7 +163,9 @@ impl Node {
         if !self.rotates {
             return Pose { position, rotation: DQuat::IDENTITY };
         }
-        let turn = DQuat::from_scaled_axis(dt * (u.angular - self.free_spin));
+        let spin = self.wheel_axis.map_or(DVec3::ZERO, |axis| axis * axis.dot(u.angular));
+        let turn = DQuat::from_scaled_axis(dt * (u.angular - spin - self.free_spin));
+        let turn = turn * DQuat::from_scaled_axis(dt * spin);
         Pose { position, rotation: (turn * self.free_rotation).normalize() }
     }
 }

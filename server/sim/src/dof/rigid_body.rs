@@ -25,17 +25,22 @@ pub(super) fn twist(v: &[f64]) -> Twist {
 
 pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: DVec3) -> Node {
     let (start, before) = (pose(q), twist(v));
-    let free_rotation = torque_free_flow(start.rotation, before.angular, body.inertia, dt);
+    let wheel_axis = body.is_wheel.then(|| start.rotation * DVec3::Z);
+    let free_rotation = match wheel_axis {
+        Some(_) => start.rotation,
+        None => torque_free_flow(start.rotation, before.angular, body.inertia, dt),
+    };
     let inertia = world_inertia(free_rotation, body.inertia);
     let inverse_inertia = world_inertia(free_rotation, body.inertia.recip());
     let momentum = world_inertia(start.rotation, body.inertia) * before.angular;
-    let free_spin = inverse_inertia * momentum;
+    let carried_spin = inverse_inertia * momentum;
     let target = Twist {
         linear: before.linear + dt * (gravity + body.force / body.mass),
-        angular: free_spin + dt * (inverse_inertia * body.torque),
+        angular: carried_spin + dt * (inverse_inertia * body.torque),
     };
+    let free_spin = if body.is_wheel { DVec3::ZERO } else { carried_spin };
     let mass = body.mass;
-    Node { start, free_rotation, free_spin, target, before, mass, inertia, inverse_inertia, rotates: true }
+    Node { start, free_rotation, free_spin, target, before, mass, inertia, inverse_inertia, rotates: true, wheel_axis }
 }
 
 pub(super) fn advance(body: &Body, node: &Node, u: Twist, dt: f64, state: &mut State) {

@@ -203,3 +203,41 @@ fn clamped(gain: f64, error: f64, limit: f64) -> (f64, f64) {
         (limit * (error.abs() - 0.5 * limit / gain), limit * error.signum())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{RigidBodyDesc, Settings, Shape, World};
+
+    /// A chassis in free flight that yaws while its wheels spin at 20 m/s. Predicting the wheels' free nutation made
+    /// the roll grow and Newton diverge within a second.
+    #[test]
+    fn spinning_wheels_follow_a_turning_chassis() {
+        let mut world = World::new(Settings { gravity: DVec3::ZERO, ..Settings::at(1.0 / 30.0) }).unwrap();
+        let turn = DVec3::new(0.0, 0.5, 0.0);
+        let inertia = Shape::Box { half: DVec3::new(1.9, 0.3, 0.85) }.inertia(1100.0);
+        let body = RigidBodyDesc { angular_velocity: turn, ..RigidBodyDesc::new(DVec3::ZERO, 1100.0, inertia) };
+        let chassis = world.add_rigid_body(body).unwrap();
+        let inertia = Shape::Cylinder { half_length: 0.12, radius: 0.35, rounding: 0.04 }.inertia(25.0);
+        for hub in [(1.3, -0.8), (1.3, 0.8), (-1.3, -0.8), (-1.3, 0.8)].map(|(x, z)| DVec3::new(x, -0.25, z)) {
+            let wheel = RigidBodyDesc {
+                velocity: turn.cross(hub),
+                angular_velocity: turn - DVec3::Z * 57.0,
+                ..RigidBodyDesc::new(hub, 25.0, inertia)
+            };
+            let wheel = world.add_rigid_body(wheel).unwrap();
+            let control = AxleControl::default();
+            world.add_axle(AxleDesc { chassis, wheel, hub, stiffness: 4e4, damping: 4e3, control }).unwrap();
+        }
+        let before = world.momentum().angular;
+        for tick in 0..30 {
+            let report = world.step();
+            assert!(report.residual < 1e-3 && report.newton_iterations <= 5, "tick {tick}: {report:?}");
+        }
+        let change = (world.momentum().angular - before).length() / before.length();
+        assert!(change < 3e-3, "angular momentum changed by {change}");
+        // What the wheels' momentum resists in yaw turns up as roll: L_wheels ω / I_roll a second at most.
+        let turn = world.angular_velocity(chassis).unwrap();
+        assert!((0.2..0.5).contains(&turn.x) && (turn.y - 0.5).abs() < 0.05, "{turn}");
+    }
+}
