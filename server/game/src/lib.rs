@@ -16,6 +16,7 @@ pub mod controls;
 pub mod driver;
 pub mod pipeline;
 pub mod prop;
+pub mod scene;
 pub mod spawn;
 pub mod vehicle;
 
