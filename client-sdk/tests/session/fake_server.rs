@@ -1,0 +1,207 @@
+//! A server that does what a test tells it, good or bad.
+
+use std::{
+    net::TcpListener,
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicU16, Ordering},
+    },
+};
+
+use pita_client::{ActorDescription, Description, Event};
+use pita_protocol::{
+    Keys, encode,
+    message::{
+        EventMessage, InputAck, InputPacket, JoinAccepted, JoinReply, JoinRequest, PartDescription, Role, Shape,
+        Snapshot, Status,
+    },
+    seal::{SessionKey, open},
+    slices::{KIND_RIGID_BODY, pack},
+};
+use tokio::sync::{Mutex as AsyncMutex, mpsc};
+use zenoh::{
+    Wait,
+    query::{Query, Queryable},
+    sample::SampleKind,
+};
+
+use crate::soon;
+
+pub const ARENA: &str = "fake";
+/// Slot and epoch of the first session; later ones count up the slot.
+pub const SLOT: u16 = 3;
+pub const EPOCH: u32 = 41;
+/// The own actor of slot `s` is `s`, its root slice `10 s`.
+pub const ROOT: u32 = 30;
+/// Number of the last event in the description that a session starts from.
+pub const EVENTS_BEFORE: u32 = 7;
+
+pub type Answer = Box<dyn Fn(&[u8]) -> Option<Vec<u8>> + Send + Sync>;
+
+/// The fake. Everything that it declares goes with it.
+pub struct FakeServer {
+    pub endpoint: String,
+    pub zenoh: zenoh::Session,
+    pub description: Arc<Mutex<Description>>,
+    keys: Keys,
+    inputs: AsyncMutex<mpsc::UnboundedReceiver<(u16, Vec<u8>)>>,
+    live: AsyncMutex<mpsc::UnboundedReceiver<(String, bool)>>,
+    queryables: Vec<Queryable<()>>,
+}
+
+impl FakeServer {
+    /// Accepts everybody.
+    pub async fn start() -> Self {
+        let slots = AtomicU16::new(SLOT);
+        Self::answering(Box::new(move |request| {
+            let request: JoinRequest = pita_protocol::decode(request).expect("the client's request");
+            Some(accept(slots.fetch_add(1, Ordering::Relaxed), request.role))
+        }))
+        .await
+    }
+
+    /// Answers joins by `join`.
+    pub async fn answering(join: Answer) -> Self {
+        let (zenoh, endpoint) = listen().await;
+        let keys = Keys::new(ARENA).unwrap();
+        let description = Arc::new(Mutex::new(description(EVENTS_BEFORE, &[u32::from(SLOT)])));
+        let (input_sender, inputs) = mpsc::unbounded_channel();
+        let of_inputs = keys.clone();
+        let inputs_at = zenoh.declare_subscriber(keys.all_inputs()).callback(move |sample| {
+            let slot = of_inputs.slot_of_input(sample.key_expr()).expect("an input key");
+            let _ = input_sender.send((slot, sample.payload().to_bytes().into_owned()));
+        });
+        inputs_at.background().await.unwrap();
+        let (live_sender, live) = mpsc::unbounded_channel();
+        let live_at = zenoh.liveliness().declare_subscriber(keys.all_live()).callback(move |sample| {
+            let _ = live_sender.send((sample.key_expr().to_string(), sample.kind() == SampleKind::Put));
+        });
+        live_at.background().await.unwrap();
+        let described = Arc::clone(&description);
+        let status = encode(&Status { arena: ARENA.into(), ..Status::default() });
+        let queryables = vec![
+            answer(&zenoh, keys.join(), join).await,
+            answer(&zenoh, keys.describe(), Box::new(move |_| Some(encode(&*described.lock().unwrap())))).await,
+            answer(&zenoh, keys.status(), Box::new(move |_| Some(status.clone()))).await,
+        ];
+        let (inputs, live) = (AsyncMutex::new(inputs), AsyncMutex::new(live));
+        Self { endpoint, zenoh, description, keys, inputs, live, queryables: queryables }
+    }
+
+    /// Lets another arena answer status queries.
+    pub async fn also_run(&mut self, arena: &str) {
+        let status = encode(&Status { arena: arena.into(), ..Status::default() });
+        let key = Keys::new(arena).unwrap().status();
+        self.queryables.push(answer(&self.zenoh, key, Box::new(move |_| Some(status.clone()))).await);
+    }
+
+    pub async fn put_snapshot(&self, snapshot: Snapshot) {
+        self.put_on_snapshot(encode(&snapshot)).await;
+    }
+
+    pub async fn put_on_snapshot(&self, bytes: Vec<u8>) {
+        self.zenoh.put(self.keys.snapshot(SLOT), bytes).await.unwrap();
+    }
+
+    pub async fn put_event(&self, sequence: u32, event: Event) {
+        self.put_on_event(encode(&EventMessage { sequence, tick: 100, event })).await;
+    }
+
+    pub async fn put_on_event(&self, bytes: Vec<u8>) {
+        self.zenoh.put(self.keys.event(), bytes).await.unwrap();
+    }
+
+    /// The next input, opened as the server would.
+    pub async fn input(&self) -> InputPacket {
+        let (slot, bytes) = soon("an input", async { self.inputs.lock().await.recv().await }).await.unwrap();
+        open(&bytes, &session_key(), &self.keys.input(slot)).unwrap()
+    }
+
+    /// The next change of a liveliness token: its key, and whether it came.
+    pub async fn liveliness(&self) -> (String, bool) {
+        soon("a liveliness token", async { self.live.lock().await.recv().await }).await.unwrap()
+    }
+}
+
+async fn listen() -> (zenoh::Session, String) {
+    // Another process may take the port between the two steps; then the next one is tried.
+    for _ in 0..20 {
+        let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let endpoint = format!("tcp/127.0.0.1:{port}");
+        let mut config = zenoh::Config::default();
+        for (key, value) in [
+            ("mode", "\"peer\"".to_owned()),
+            ("listen/endpoints", format!("[\"{endpoint}\"]")),
+            ("scouting/multicast/enabled", "false".to_owned()),
+            ("scouting/gossip/enabled", "false".to_owned()),
+        ] {
+            config.insert_json5(key, &value).unwrap();
+        }
+        if let Ok(zenoh) = zenoh::open(config).await {
+            return (zenoh, endpoint);
+        }
+    }
+    panic!("no free port on loopback");
+}
+
+async fn answer(zenoh: &zenoh::Session, key: String, answer: Answer) -> Queryable<()> {
+    let reply_key = key.clone();
+    let reply = move |query: Query| {
+        let request = query.payload().map(|payload| payload.to_bytes().into_owned()).unwrap_or_default();
+        if let Some(bytes) = answer(&request) {
+            query.reply(reply_key.clone(), bytes).wait().unwrap();
+        }
+    };
+    zenoh.declare_queryable(key).callback(reply).await.unwrap()
+}
+
+/// The key that every session of the fake gets.
+pub fn session_key() -> SessionKey {
+    SessionKey([9; 32])
+}
+
+/// The reply that lets a client in.
+pub fn accept(slot: u16, role: Role) -> Vec<u8> {
+    let actor = (role == Role::Player).then_some(u32::from(slot));
+    encode(&JoinReply::Accepted(Box::new(JoinAccepted {
+        slot,
+        epoch: EPOCH,
+        session_key: session_key(),
+        tick_hz: 30,
+        input_timeout_ms: 900,
+        actor,
+        description: description(EVENTS_BEFORE, &[u32::from(slot)]),
+    })))
+}
+
+pub fn description(event_sequence: u32, actors: &[u32]) -> Description {
+    Description {
+        arena: ARENA.into(),
+        title: "A fake".into(),
+        tick: 100,
+        event_sequence,
+        gravity: [0.0, -9.81, 0.0],
+        statics: Vec::new(),
+        actors: actors.iter().map(|&id| actor(id)).collect(),
+    }
+}
+
+pub fn actor(id: u32) -> ActorDescription {
+    let part = PartDescription { slice: 10 * id, shape: Shape::Ball { radius: 0.5 } };
+    ActorDescription { id, kind: "vehicle".into(), name: format!("car {id}"), slot: None, parts: vec![part] }
+}
+
+/// The own car of the first session at `x = tick − 100` m.
+pub fn snapshot(tick: u64) -> Snapshot {
+    let x = tick as f32 - 100.0;
+    Snapshot { tick, ack: InputAck::default(), event_sequence: EVENTS_BEFORE, dof: car(ROOT, x) }
+}
+
+/// One rigid body at `x`, 30 m/s fast along it.
+pub fn car(slice: u32, x: f32) -> Vec<u8> {
+    let mut dof = Vec::new();
+    let q = [x, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0];
+    let v = [30.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    pack(slice, KIND_RIGID_BODY, q.into_iter(), v.into_iter(), &mut dof);
+    dof
+}
