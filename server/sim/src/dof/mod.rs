@@ -154,9 +154,16 @@ pub(crate) struct Node {
     pub rotates: bool,
     /// Axis of a wheel at the start of the tick.
     pub wheel_axis: Option<DVec3>,
+    /// Angular velocity with which Newton starts, where that of the guess would be a bad one, rad/s.
+    pub guessed_spin: Option<DVec3>,
 }
 
 impl Node {
+    /// A guess of the twist at the end of the tick, corrected by what is known better.
+    pub fn start_from(&self, guess: Twist) -> Twist {
+        Twist { angular: self.guessed_spin.unwrap_or(guess.angular), ..guess }
+    }
+
     /// Pose after a tick of `dt` with twist `u`.
     pub fn pose(&self, u: Twist, dt: f64) -> Pose {
         let position = self.start.position + dt * u.linear;

@@ -29,6 +29,7 @@ pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: DVec3) -
         inverse_inertia: DMat3::IDENTITY,
         rotates: false,
         wheel_axis: None,
+        guessed_spin: None,
     }
 }
 

@@ -40,7 +40,20 @@ pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: DVec3) -
     };
     let free_spin = if body.is_wheel { DVec3::ZERO } else { carried_spin };
     let mass = body.mass;
-    Node { start, free_rotation, free_spin, target, before, mass, inertia, inverse_inertia, rotates: true, wheel_axis }
+    let (rotates, guessed_spin) = (true, None);
+    Node {
+        start,
+        free_rotation,
+        free_spin,
+        target,
+        before,
+        mass,
+        inertia,
+        inverse_inertia,
+        rotates,
+        wheel_axis,
+        guessed_spin,
+    }
 }
 
 pub(super) fn advance(body: &Body, node: &Node, u: Twist, dt: f64, state: &mut State) {

@@ -61,7 +61,7 @@ impl<const D: usize> Newton<D> {
         let mut least = f64::NAN;
         for (i, twist) in CANDIDATES.into_iter().enumerate() {
             self.start.clear();
-            self.start.extend(problem.nodes.iter().map(|node| entry_of::<D>(twist(node))));
+            self.start.extend(problem.nodes.iter().map(|node| entry_of::<D>(node.start_from(twist(node)))));
             problem.move_to(&self.start);
             let energy = problem.evaluate(&mut self.residual);
             if i == 0 || energy < least {

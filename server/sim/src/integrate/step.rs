@@ -151,6 +151,8 @@ impl Integrator {
             let Some(ends) = ends(scene, Some(desc.chassis), Some(desc.wheel)) else { continue };
             let Some((solve, nodes)) = self.localise(ends) else { continue };
             let term = AxleTerm::new(nodes, desc, &solve.problem.nodes, solver.joint_stiffness, *dt);
+            let wheel = nodes[1] as usize;
+            solve.problem.nodes[wheel].guessed_spin = Some(term.guess_spin(&solve.problem.nodes, *dt));
             solve.problem.terms.axles.push(term);
         }
         for (desc, gains) in scene.potentials.pds.values() {

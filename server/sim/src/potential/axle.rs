@@ -117,6 +117,16 @@ impl AxleTerm {
         }
     }
 
+    /// The wheel's angular velocity if the chassis turns on as it did and the wheel's plane follows it and the steering,
+    /// rad/s. The wheel's own momentum says something else: it resists any turn of the plane.
+    pub fn guess_spin(&self, all: &[Node], dt: f64) -> DVec3 {
+        let [chassis, wheel] = self.nodes.map(|i| &all[i as usize]);
+        let turn = chassis.before.angular;
+        let wanted = DQuat::from_scaled_axis(dt * turn) * chassis.start.rotation * self.axis;
+        let spin = self.spin_axis * self.spin_axis.dot(wheel.before.angular);
+        spin + self.spin_axis.cross(wanted) / dt
+    }
+
     /// Hub in the chassis' frame, from where it would be without load, m.
     fn travel(&self, at: &Candidate) -> DVec3 {
         let (chassis, wheel) = (at.pose(self.nodes[0]), at.pose(self.nodes[1]));
