@@ -1,0 +1,228 @@
+//! The answering thread: joins and every other query.
+//!
+//! Replies follow the asker's congestion control, so that a frozen asker may hold its reply up until Zenoh closes the
+//! connection. That is why they have a thread of their own: Zenoh's callbacks only put queries into a bounded queue, and
+//! neither inputs nor snapshots wait behind a reply.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{self, Receiver, Sender};
+
+use pita_protocol::message::{Description, JoinAccepted, JoinReply, JoinRequest, Refusal, TicksRequest};
+use pita_protocol::seal::SessionKey;
+use pita_protocol::{Message, PROTOCOL_VERSION, WireError};
+use zenoh::Wait;
+use zenoh::query::Query;
+
+use crate::metrics;
+use crate::sessions::{JoinRefusal, SessionId};
+use crate::shared::Shared;
+
+/// Most queries that wait; further ones are dropped, and their askers time out.
+const QUERIES_MAX: usize = 256;
+
+/// What a query asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Question {
+    /// A session.
+    Join,
+    /// The world.
+    Describe,
+    /// How the daemon does.
+    Status,
+    /// What ticks cost.
+    Ticks,
+}
+
+/// What the answering thread does next.
+pub enum Work {
+    /// Answers a query.
+    Answer(Question, Query),
+    /// Accepts the join of a session.
+    Admitted {
+        /// The session.
+        id: SessionId,
+        /// Its actor.
+        actor: Option<u32>,
+        /// The world, the actor in it.
+        description: Arc<Description>,
+    },
+    /// The session is over; if its join still waits, it is refused.
+    Ended(SessionId),
+    /// Refuses what waits and ends the thread.
+    Stop,
+}
+
+/// The way into the thread's queue. Never waits.
+#[derive(Clone)]
+pub struct Asker {
+    work: Sender<Work>,
+    queries: Arc<AtomicUsize>,
+}
+
+impl Asker {
+    /// Queues `query`, unless too many wait.
+    pub fn ask(&self, question: Question, query: Query) {
+        if self.queries.fetch_add(1, Ordering::Relaxed) >= QUERIES_MAX {
+            self.queries.fetch_sub(1, Ordering::Relaxed);
+            return;
+        }
+        self.tell(Work::Answer(question, query));
+    }
+
+    /// Queues `work` other than queries, of which there is little: two a session.
+    pub fn tell(&self, work: Work) {
+        // The thread ends last; after that nobody is left to be told anything.
+        let _ = self.work.send(work);
+    }
+}
+
+/// The thread's state.
+pub struct Answering {
+    shared: Arc<Shared>,
+    work: Receiver<Work>,
+    queries: Arc<AtomicUsize>,
+    /// Sessions that exist, but whose player is not in the arena yet.
+    pending: HashMap<SessionId, (Query, SessionKey)>,
+}
+
+impl Answering {
+    /// The thread's state and the way into its queue.
+    pub fn new(shared: Arc<Shared>) -> (Self, Asker) {
+        let (sender, work) = mpsc::channel();
+        let queries = Arc::new(AtomicUsize::new(0));
+        let asker = Asker { work: sender, queries: queries.clone() };
+        (Self { shared, work, queries, pending: HashMap::new() }, asker)
+    }
+
+    /// Answers until [`Work::Stop`].
+    pub fn run(mut self) {
+        while let Ok(work) = self.work.recv() {
+            match work {
+                Work::Answer(question, query) => {
+                    self.queries.fetch_sub(1, Ordering::Relaxed);
+                    self.answer(question, query);
+                }
+                Work::Admitted { id, actor, description } => self.accept(id, actor, &description),
+                Work::Ended(id) => self.refuse_pending(id),
+                Work::Stop => break,
+            }
+        }
+        for (_, (query, _)) in self.pending.drain() {
+            reply(&self.shared, &query, self.shared.keys.join(), &JoinReply::Refused(Refusal::Closing));
+        }
+    }
+
+    fn answer(&mut self, question: Question, query: Query) {
+        let shared = &*self.shared;
+        shared.counters.received_bytes.add(query.payload().map_or(0, |payload| payload.len()) as u64);
+        match question {
+            Question::Join => self.join(query),
+            Question::Describe => reply(shared, &query, shared.keys.describe(), &*shared.description()),
+            Question::Status => reply(shared, &query, shared.keys.status(), &metrics::status(shared)),
+            Question::Ticks => match payload::<TicksRequest>(&query) {
+                Ok(request) => {
+                    let records = shared.metrics().records_since(request.since);
+                    reply(shared, &query, shared.keys.ticks(), &records);
+                }
+                Err(error) => {
+                    shared.counters.query_malformed.add(1);
+                    reply_error(shared, &query, &error.to_string());
+                }
+            },
+        }
+    }
+
+    fn join(&mut self, query: Query) {
+        match self.open_session(&query) {
+            Ok((id, key)) => {
+                self.pending.insert(id, (query, key));
+                self.shared.wake_publisher();
+            }
+            Err(refusal) => {
+                let counters = &self.shared.counters;
+                match &refusal {
+                    Refusal::Version { .. } => counters.join_version.add(1),
+                    Refusal::Malformed(_) => counters.join_malformed.add(1),
+                    Refusal::Full { .. } => counters.join_full.add(1),
+                    Refusal::Closing => {}
+                }
+                reply(&self.shared, &query, self.shared.keys.join(), &JoinReply::Refused(refusal));
+            }
+        }
+    }
+
+    /// Begins the session that `query` asks for.
+    fn open_session(&self, query: &Query) -> Result<(SessionId, SessionKey), Refusal> {
+        let request: JoinRequest = payload(query).map_err(|error| match error {
+            WireError::Version { theirs } => Refusal::Version { server: PROTOCOL_VERSION, client: theirs },
+            other => Refusal::Malformed(other.to_string()),
+        })?;
+        let key = new_key().map_err(|error| {
+            tracing::error!("no randomness from the operating system: {error}");
+            Refusal::Closing
+        })?;
+        let mut sessions = self.shared.sessions();
+        let joined = sessions.join(&request.name, request.role, key.clone(), self.shared.clock.ms());
+        let id = joined.map_err(|refusal| match refusal {
+            JoinRefusal::Full => Refusal::Full { slots: sessions.slots_of(request.role) },
+            JoinRefusal::Closing => Refusal::Closing,
+        })?;
+        Ok((id, key))
+    }
+
+    fn accept(&mut self, id: SessionId, actor: Option<u32>, description: &Description) {
+        let Some((query, session_key)) = self.pending.remove(&id) else { return };
+        let accepted = JoinAccepted {
+            slot: id.slot,
+            epoch: id.epoch,
+            session_key,
+            tick_hz: self.shared.tick_hz,
+            input_timeout_ms: self.shared.input_timeout_ms,
+            actor,
+            description: description.clone(),
+        };
+        reply(&self.shared, &query, self.shared.keys.join(), &JoinReply::Accepted(Box::new(accepted)));
+    }
+
+    fn refuse_pending(&mut self, id: SessionId) {
+        let Some((query, _)) = self.pending.remove(&id) else { return };
+        self.shared.counters.join_full.add(1);
+        let slots = self.shared.sessions().slots();
+        reply(&self.shared, &query, self.shared.keys.join(), &JoinReply::Refused(Refusal::Full { slots }));
+    }
+}
+
+/// A secret from the operating system.
+fn new_key() -> Result<SessionKey, rand::rngs::SysError> {
+    use rand::TryRng;
+    let mut secret = [0; 32];
+    rand::rngs::SysRng.try_fill_bytes(&mut secret)?;
+    Ok(SessionKey(secret))
+}
+
+/// Decodes what `query` carries; nothing at all is malformed.
+fn payload<M: Message>(query: &Query) -> Result<M, WireError> {
+    let payload = query.payload().ok_or(WireError::Malformed)?;
+    // Its length comes first: putting fragments together allocates.
+    if payload.len() > M::MAX_BYTES {
+        return Err(WireError::TooLong { bytes: payload.len(), max: M::MAX_BYTES });
+    }
+    pita_protocol::decode(&payload.to_bytes())
+}
+
+fn reply<M: Message>(shared: &Shared, query: &Query, key: String, message: &M) {
+    let bytes = pita_protocol::encode(message);
+    shared.counters.sent_bytes.add(bytes.len() as u64);
+    if let Err(reason) = query.reply(key, bytes).wait() {
+        tracing::debug!("reply to {}: {reason}", query.key_expr());
+    }
+}
+
+fn reply_error(shared: &Shared, query: &Query, text: &str) {
+    shared.counters.sent_bytes.add(text.len() as u64);
+    if let Err(reason) = query.reply_err(text).wait() {
+        tracing::debug!("reply to {}: {reason}", query.key_expr());
+    }
+}

@@ -1,0 +1,96 @@
+//! The command line.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+use pita_protocol::DEFAULT_ENDPOINT;
+use pita_protocol::build_info::VERSION_AND_COMMIT;
+
+use crate::config::TickRate;
+use crate::{check, daemon, status};
+
+/// Headless physics game server.
+#[derive(Debug, Parser)]
+#[command(name = "pita-server", version = VERSION_AND_COMMIT, args_conflicts_with_subcommands = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    run: RunArgs,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run the server (also without a subcommand)
+    Run(RunArgs),
+    /// Check configuration and arena files
+    Check(CheckArgs),
+    /// Ask a running server how it does
+    Status(StatusArgs),
+}
+
+/// Arguments of `run`. What is given here comes before the configuration.
+#[derive(Debug, Default, Args)]
+pub struct RunArgs {
+    /// Configuration file; keys that it lacks have their defaults
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Endpoint to listen on; port 0 takes a free one
+    #[arg(long, value_name = "tcp/ADDRESS:PORT")]
+    pub listen: Option<String>,
+    /// Name of a built-in arena, or path of an arena file
+    #[arg(long, value_name = "NAME|FILE")]
+    pub arena: Option<String>,
+    /// Ticks a second
+    #[arg(long, value_name = "30|25")]
+    pub tick_hz: Option<TickRate>,
+}
+
+/// Arguments of `check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Files, or folders of them; without any: what is built in, and configs/ where there is one
+    pub paths: Vec<PathBuf>,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `status`.
+#[derive(Debug, Args)]
+pub struct StatusArgs {
+    /// Endpoint of the server
+    #[arg(long, value_name = "ENDPOINT", default_value = DEFAULT_ENDPOINT)]
+    pub connect: String,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Cli {
+    /// Does what was asked for.
+    pub fn execute(self) -> ExitCode {
+        match self.command.unwrap_or(Command::Run(self.run)) {
+            Command::Run(args) => daemon::run(&args),
+            Command::Check(args) => check::run(&args),
+            Command::Status(args) => status::run(&args),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent_and_runs_by_default() {
+        Cli::command().debug_assert();
+        let cli = Cli::try_parse_from(["pita-server", "--tick-hz", "25", "--listen", "tcp/127.0.0.1:0"]).unwrap();
+        assert!(cli.command.is_none());
+        assert_eq!(cli.run.tick_hz.map(TickRate::hz), Some(25));
+        let refused = Cli::try_parse_from(["pita-server", "run", "--tick-hz", "60"]).unwrap_err().to_string();
+        assert!(refused.contains("--tick-hz") && refused.contains("60") && refused.contains("30 or 25"), "{refused}");
+    }
+}

@@ -1,0 +1,235 @@
+//! `server.toml`: every key with its unit and range.
+//!
+//! Owns the daemon's configuration and its defaults, which are the text of `configs/server.toml` itself, compiled in.
+//! A given file is laid over the defaults key by key, so that it needs only what it changes.
+
+mod within;
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+pub use within::{TickRate, Within};
+
+/// The defaults, and the documentation of every key.
+pub const DEFAULT_TEXT: &str = include_str!("../../configs/server.toml");
+
+/// Name under which errors speak of [`DEFAULT_TEXT`].
+pub const BUILT_IN: &str = "built-in server.toml";
+
+/// The whole file.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ServerConfig {
+    /// Zenoh.
+    pub network: Network,
+    /// What is simulated.
+    pub arena: ArenaChoice,
+    /// Pacing.
+    pub tick: Tick,
+    /// Slots and timeouts.
+    pub sessions: SessionLimits,
+    /// What is said on stdout.
+    pub report: Report,
+}
+
+/// `[network]`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Network {
+    /// Endpoint to listen on.
+    pub listen: String,
+    /// Silence after which a connection is closed, ms.
+    pub lease_ms: Within<500, 60_000>,
+    /// Connections at once.
+    pub connections_max: Within<1, 10_000>,
+    /// Longest message that is received, bytes.
+    pub message_bytes_max: Within<4096, 1_048_576>,
+    /// Highest rate of inputs over one connection, Hz.
+    pub input_rate_max_hz: Within<60, 100_000>,
+}
+
+/// `[arena]`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ArenaChoice {
+    /// Built-in name or path.
+    pub source: String,
+    /// Threads that integrate.
+    pub threads: Within<1, 64>,
+}
+
+/// `[tick]`
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tick {
+    /// Ticks a second.
+    pub tick_hz: TickRate,
+    /// What to do when ticks take longer than their period.
+    pub when_behind: WhenBehind,
+    /// Ticks to catch up or to skip at once.
+    pub behind_ticks_max: Within<0, 300>,
+}
+
+/// What a pacer does about missed ticks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum WhenBehind {
+    /// Every tick is simulated; late ones follow each other without a pause.
+    SlowDown,
+    /// Ticks missed by a whole period are left out, their numbers with them.
+    Skip,
+}
+
+/// `[sessions]`
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SessionLimits {
+    /// Slots of players.
+    pub players_max: Within<1, 1024>,
+    /// Slots of spectators.
+    pub spectators_max: Within<0, 1024>,
+    /// A player without input for so long is put out, ms.
+    pub input_timeout_ms: Within<500, 600_000>,
+    /// After so long without input the controls are let go, ms.
+    pub coast_after_ms: Within<50, 60_000>,
+    /// Input packets of one session that are looked at between two ticks.
+    pub input_packets_per_tick_max: Within<1, 1000>,
+}
+
+/// `[report]`
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Report {
+    /// Time between two status lines, s.
+    pub status_line_s: Within<1, 3600>,
+}
+
+/// Why there is no configuration.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("{}: {reason}", file.display())]
+    Unreadable {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        reason: std::io::Error,
+    },
+    /// The file is no TOML.
+    #[error("{file}: {reason}")]
+    Syntax {
+        /// The file.
+        file: String,
+        /// Line, column and cause.
+        reason: String,
+    },
+    /// A key is unknown, or its value is not allowed.
+    #[error("{file}: {key}: {reason}")]
+    Key {
+        /// The file.
+        file: String,
+        /// Path of the key, `tick.tick_hz`.
+        key: String,
+        /// The value and what is allowed.
+        reason: String,
+    },
+}
+
+impl ServerConfig {
+    /// The compiled-in configuration.
+    pub fn built_in() -> Self {
+        // A unit test parses this very text.
+        Self::parse(DEFAULT_TEXT, BUILT_IN).expect("the compiled-in configuration is valid")
+    }
+
+    /// Reads and checks `file`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] naming file, key, value and allowed range.
+    pub fn from_file(file: &Path) -> Result<Self, ConfigError> {
+        let unreadable = |reason| ConfigError::Unreadable { file: file.to_owned(), reason };
+        Self::parse(&std::fs::read_to_string(file).map_err(unreadable)?, &file.display().to_string())
+    }
+
+    /// Checks `text`, laid over the defaults; errors call it `file`.
+    ///
+    /// # Errors
+    /// [`ConfigError::Syntax`] and [`ConfigError::Key`].
+    pub fn parse(text: &str, file: &str) -> Result<Self, ConfigError> {
+        let syntax = |e: toml::de::Error| ConfigError::Syntax { file: file.to_owned(), reason: e.to_string() };
+        let given: toml::Table = text.parse().map_err(syntax)?;
+        let mut merged: toml::Table = DEFAULT_TEXT.parse().map_err(syntax)?;
+        overlay(&mut merged, given);
+        let config = Self::deserialize(toml::Value::Table(merged)).map_err(|e| key_error(file, &e))?;
+        crate::network::check_endpoint(&config.network.listen).map_err(|reason| ConfigError::Key {
+            file: file.to_owned(),
+            key: "network.listen".to_owned(),
+            reason,
+        })?;
+        Ok(config)
+    }
+}
+
+/// Lays `given` over `base`, tables into tables, anything else instead of what was there.
+fn overlay(base: &mut toml::Table, given: toml::Table) {
+    for (key, value) in given {
+        match (base.get_mut(&key), value) {
+            (Some(toml::Value::Table(below)), toml::Value::Table(above)) => overlay(below, above),
+            (_, value) => {
+                base.insert(key, value);
+            }
+        }
+    }
+}
+
+/// Takes apart what toml says of a value: the cause, and behind it "in `path.of.key`".
+fn key_error(file: &str, error: &toml::de::Error) -> ConfigError {
+    let text = error.to_string();
+    let path = text.split_once("\nin `").and_then(|(_, rest)| rest.split_once('`')).map(|(path, _)| path);
+    ConfigError::Key {
+        file: file.to_owned(),
+        key: path.unwrap_or("top level").to_owned(),
+        reason: error.message().to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(text: &str) -> String {
+        ServerConfig::parse(text, "my.toml").expect_err(text).to_string()
+    }
+
+    #[test]
+    fn the_compiled_in_text_is_valid_and_a_file_changes_only_what_it_names() {
+        let built_in = ServerConfig::built_in();
+        let changed = ServerConfig::parse("[tick]\ntick_hz = 25", "my.toml").unwrap();
+        assert_eq!(changed.tick.tick_hz.hz(), 25);
+        assert_eq!(ServerConfig { tick: built_in.tick, ..changed }, built_in);
+    }
+
+    #[test]
+    fn refusals_name_file_key_value_and_allowed_range() {
+        for (text, words) in [
+            ("[tick]\ntick_hz = 29", &["my.toml", "tick.tick_hz", "29", "30 or 25"][..]),
+            ("[tick]\nwhen_behind = 'panic'", &["tick.when_behind", "panic", "slow-down", "skip"]),
+            ("[sessions]\nplayers_max = 0", &["my.toml", "sessions.players_max", "0", "1 to 1024"]),
+            ("[sessions]\nplayers_max = 99999999999", &["sessions.players_max", "99999999999", "1 to 1024"]),
+            ("[sessions]\nplayers_max = -1", &["sessions.players_max", "-1", "1 to 1024"]),
+            ("[sessions]\nplayers_max = 'many'", &["sessions.players_max", "many", "1 to 1024"]),
+            ("[sessions]\nplayers_max = 1.5", &["sessions.players_max", "1.5", "1 to 1024"]),
+            ("[sessions]\nplayers = 3", &["my.toml", "sessions", "players", "unknown"]),
+            ("[session]\nplayers_max = 3", &["my.toml", "session", "unknown"]),
+            ("tick = 3", &["my.toml", "tick", "3"]),
+            ("[network]\nlisten = 'localhost'", &["network.listen", "localhost", "tcp/"]),
+            ("[tick]\ntick_hz =", &["my.toml", "line 2"]),
+        ] {
+            let said = refusal(text);
+            for word in words {
+                assert!(said.contains(word), "{text:?} is answered by {said:?}, which lacks {word:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! `pita-server run`: puts the parts together, watches over them, and ends them in order.
+
+mod serve;
+
+use std::io::IsTerminal;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
+
+use pita_game::{Arena, ArenaSettings};
+use pita_protocol::Keys;
+use tokio::signal::unix::{Signal, SignalKind, signal};
+
+use crate::arena_source::{self, SourceError};
+use crate::cli::RunArgs;
+use crate::config::{ConfigError, ServerConfig};
+use crate::frame::Totals;
+use crate::network::{self, NetworkError};
+use crate::sessions::{Limits, Sessions};
+use crate::shared::{Phase, Shared, Start};
+use crate::stopwatch::Clock;
+use crate::{description, metrics, report};
+use serve::Serving;
+
+/// Threads of the runtime: signals, status lines and Zenoh's set-up; its traffic has threads of its own.
+const RUNTIME_THREADS: usize = 2;
+/// How long the end waits for clients to leave after they were told, ms.
+const FAREWELL_MS: u64 = 500;
+/// How often it looks whether they have left.
+const FAREWELL_STEP: Duration = Duration::from_millis(10);
+/// Most inputs that may wait for a tick, whatever the limits of sessions multiply to.
+const INPUTS_MAX: usize = 65_536;
+
+/// Why the daemon does not run, or no longer.
+#[derive(Debug, thiserror::Error)]
+pub enum DaemonError {
+    /// Bad configuration.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Bad arena.
+    #[error(transparent)]
+    Arena(#[from] SourceError),
+    /// The arena's name is no part of a key expression.
+    #[error("arena {name:?}: {reason}")]
+    ArenaName {
+        /// The name.
+        name: String,
+        /// What is allowed.
+        reason: pita_protocol::WireError,
+    },
+    /// It cannot listen.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+    /// Zenoh refuses a declaration.
+    #[error("Zenoh: {0}")]
+    Zenoh(String),
+    /// The operating system gives no thread or no signals.
+    #[error("cannot start: {0}")]
+    System(#[from] std::io::Error),
+    /// A thread ended that should not have.
+    #[error("the {0} thread ended unexpectedly; what it said is above")]
+    ThreadEnded(&'static str),
+}
+
+impl From<zenoh::Error> for DaemonError {
+    fn from(error: zenoh::Error) -> Self {
+        Self::Zenoh(error.to_string())
+    }
+}
+
+/// Runs the daemon until a signal ends it; exit code 0 then.
+pub fn run(args: &RunArgs) -> ExitCode {
+    let clock = Clock::start();
+    init_logging();
+    match configure(args).and_then(|(config, arena)| run_arena(&config, arena, clock)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => report::failure(&error.to_string()),
+    }
+}
+
+/// Reads configuration and arena; arguments come before the file.
+fn configure(args: &RunArgs) -> Result<(ServerConfig, Arena), DaemonError> {
+    let mut config = match &args.config {
+        Some(file) => ServerConfig::from_file(file)?,
+        None => ServerConfig::built_in(),
+    };
+    if let Some(listen) = &args.listen {
+        config.network.listen.clone_from(listen);
+    }
+    if let Some(arena) = &args.arena {
+        config.arena.source.clone_from(arena);
+    }
+    if let Some(rate) = args.tick_hz {
+        config.tick.tick_hz = rate;
+    }
+    let settings = ArenaSettings { tick_hz: config.tick.tick_hz.hz(), threads: config.arena.threads.get() as usize };
+    let arena = arena_source::load(&config.arena.source, &settings)?;
+    Ok((config, arena))
+}
+
+fn run_arena(config: &ServerConfig, arena: Arena, clock: Clock) -> Result<(), DaemonError> {
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(RUNTIME_THREADS).enable_all().build()?;
+    runtime.block_on(async {
+        // Before anything that has to be ended in order.
+        let signals = Signals::new()?;
+        let shared = Arc::new(share(config, &arena, clock)?);
+        let (session, endpoint) = network::open(&config.network).await?;
+        let mut serving = Serving::start(config, arena, &shared, session)?;
+        report::print(&report::welcome(&endpoint, &metrics::status(&shared)));
+        let ended = watch(config, &shared, &mut serving, signals).await;
+        say_farewell(&shared).await;
+        serving.stop(&shared).await;
+        ended
+    })
+}
+
+fn share(config: &ServerConfig, arena: &Arena, clock: Clock) -> Result<Shared, DaemonError> {
+    let name_error = |reason| DaemonError::ArenaName { name: arena.name().to_owned(), reason };
+    let limits = config.sessions;
+    // Ranges of the configuration are within u16.
+    let players = arena.max_players().min(limits.players_max.get() as u16);
+    let packets = limits.input_packets_per_tick_max.get();
+    Ok(Shared::new(Start {
+        keys: Keys::new(arena.name()).map_err(name_error)?,
+        clock,
+        tick_hz: config.tick.tick_hz.hz(),
+        input_timeout_ms: limits.input_timeout_ms.get(),
+        inputs_max: (usize::from(players) * packets as usize).clamp(1, INPUTS_MAX),
+        sessions: Sessions::new(Limits {
+            players,
+            spectators: limits.spectators_max.get() as u16,
+            input_timeout_ms: limits.input_timeout_ms.get().into(),
+            input_packets_per_tick: packets,
+        }),
+        description: description::describe(arena),
+    }))
+}
+
+/// Prints a status line every few seconds until a signal comes or a thread ends.
+async fn watch(
+    config: &ServerConfig,
+    shared: &Shared,
+    serving: &mut Serving,
+    mut signals: Signals,
+) -> Result<(), DaemonError> {
+    let period = Duration::from_secs(config.report.status_line_s.get().into());
+    let mut lines = tokio::time::interval_at(tokio::time::Instant::now() + period, period);
+    let mut totals = Totals::default();
+    loop {
+        tokio::select! {
+            _ = lines.tick() => {
+                report::print(&report::status_line(&metrics::status(shared)));
+                let now = shared.metrics().totals();
+                if let Some(line) = report::overrun_line(&totals, &now, config.tick.when_behind) {
+                    report::print(&line);
+                }
+                totals = now;
+            }
+            name = serving.thread_ended() => return Err(DaemonError::ThreadEnded(name)),
+            () = signals.next() => break,
+        }
+    }
+    report::print("Ending: clients are told. Another Ctrl-C ends at once.");
+    tokio::spawn(async move {
+        signals.next().await;
+        std::process::exit(130);
+    });
+    Ok(())
+}
+
+/// Tells clients that the server ends, and gives them a moment to leave.
+async fn say_farewell(shared: &Shared) {
+    shared.sessions().close();
+    shared.set_phase(Phase::Closing);
+    let until_ms = shared.clock.ms() + FAREWELL_MS;
+    // One step at least, in which the event goes out.
+    loop {
+        tokio::time::sleep(FAREWELL_STEP).await;
+        if shared.sessions().count() == 0 || shared.clock.ms() >= until_ms {
+            break;
+        }
+    }
+}
+
+/// The signals that end the daemon in order.
+struct Signals {
+    interrupt: Signal,
+    terminate: Signal,
+}
+
+impl Signals {
+    fn new() -> std::io::Result<Self> {
+        Ok(Self { interrupt: signal(SignalKind::interrupt())?, terminate: signal(SignalKind::terminate())? })
+    }
+
+    async fn next(&mut self) {
+        tokio::select! {
+            _ = self.interrupt.recv() => {}
+            _ = self.terminate.recv() => {}
+        }
+    }
+}
+
+/// Logs go to stderr; `RUST_LOG` chooses which.
+fn init_logging() {
+    use tracing_subscriber::EnvFilter;
+    let filter =
+        EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn,zenoh=error,pita_server=info"));
+    // Fails only where the process logs already, which is as good.
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let _ = log.with_ansi(std::io::stderr().is_terminal()).try_init();
+}

@@ -1,0 +1,161 @@
+//! Zenoh: how the daemon's session is configured and opened.
+//!
+//! Owns the choices that keep one client from harming the others: a peer that listens on TCP and neither scouts nor
+//! gossips, puts that are dropped rather than waited for, bounded messages, bounded input rate.
+
+use std::net::{SocketAddr, TcpListener, ToSocketAddrs};
+
+use serde_json::json;
+
+use crate::config::Network;
+
+/// Longest input that passes Zenoh's filter, bytes. Above what the protocol allows, so that the daemon counts what is
+/// somewhat too long; far below what would cost anything.
+const INPUT_FILTER_BYTES: usize = 4096;
+/// Connections that may be in their handshake: silent ones must not keep others out.
+const ACCEPT_PENDING: u32 = 1000;
+/// Time for a handshake, ms.
+const ACCEPT_TIMEOUT_MS: u32 = 2000;
+/// Longest wait for a client that does not read, where a message may not be dropped (replies, declarations), µs. Then
+/// its connection is closed.
+const WAIT_BEFORE_CLOSE_US: u32 = 50_000;
+/// Free ports tried, where one was found and then lost to somebody else.
+const FREE_PORT_ATTEMPTS: usize = 5;
+
+/// Why the daemon does not listen.
+#[derive(Debug, thiserror::Error)]
+pub enum NetworkError {
+    /// The endpoint is not of the form that we listen on.
+    #[error("network.listen: {0}")]
+    Endpoint(String),
+    /// The address cannot be had.
+    #[error("cannot listen on {endpoint}: {reason}{}", hint(reason))]
+    Bind {
+        /// Where.
+        endpoint: String,
+        /// Why.
+        reason: std::io::Error,
+    },
+    /// Zenoh did not open.
+    #[error("Zenoh does not open on {endpoint}: {reason}")]
+    Zenoh {
+        /// Where.
+        endpoint: String,
+        /// What it says.
+        reason: String,
+    },
+}
+
+fn hint(reason: &std::io::Error) -> &'static str {
+    match reason.kind() {
+        std::io::ErrorKind::AddrInUse => {
+            "\nIs another server running? `pita-server status` asks it. Or take a free port: --listen tcp/127.0.0.1:0"
+        }
+        std::io::ErrorKind::AddrNotAvailable => "\nNo interface of this machine has that address.",
+        std::io::ErrorKind::PermissionDenied => "\nPorts below 1024 are not for everybody: take a higher one.",
+        _ => "",
+    }
+}
+
+/// Opens the daemon's session; answers it with the endpoint where it listens, its real port in it.
+///
+/// # Errors
+/// [`NetworkError`], before anything listens.
+pub async fn open(config: &Network) -> Result<(zenoh::Session, String), NetworkError> {
+    let wanted = address(&config.listen).map_err(NetworkError::Endpoint)?;
+    let mut attempt = 1;
+    loop {
+        let endpoint = format!("tcp/{}", free_address(&config.listen, wanted)?);
+        match zenoh::open(configuration(config, &endpoint)).await {
+            Ok(session) => return Ok((session, endpoint)),
+            Err(_) if wanted.port() == 0 && attempt < FREE_PORT_ATTEMPTS => attempt += 1,
+            Err(reason) => return Err(NetworkError::Zenoh { endpoint, reason: reason.to_string() }),
+        }
+    }
+}
+
+/// Checks that `endpoint` is something to listen on.
+///
+/// # Errors
+/// Text with the endpoint and what is allowed.
+pub fn check_endpoint(endpoint: &str) -> Result<(), String> {
+    address(endpoint).map(drop)
+}
+
+fn address(endpoint: &str) -> Result<SocketAddr, String> {
+    let wrong = || format!("{endpoint:?} is no endpoint, allowed is tcp/ADDRESS:PORT, for example tcp/127.0.0.1:7447");
+    let address = endpoint.strip_prefix("tcp/").ok_or_else(wrong)?;
+    address.to_socket_addrs().ok().and_then(|mut found| found.next()).ok_or_else(wrong)
+}
+
+/// Takes and gives back the address, because that says more clearly than Zenoh why it cannot be had, and which port a 0
+/// became.
+fn free_address(endpoint: &str, wanted: SocketAddr) -> Result<SocketAddr, NetworkError> {
+    let bound = TcpListener::bind(wanted).and_then(|listener| listener.local_addr());
+    bound.map_err(|reason| NetworkError::Bind { endpoint: endpoint.to_owned(), reason })
+}
+
+fn configuration(config: &Network, endpoint: &str) -> zenoh::Config {
+    let inputs = "pita/*/input/**";
+    let settings = [
+        ("mode", json!("peer")),
+        ("listen/endpoints", json!([endpoint])),
+        ("scouting/multicast/enabled", json!(false)),
+        ("scouting/gossip/enabled", json!(false)),
+        ("timestamping/enabled", json!(false)),
+        ("transport/unicast/accept_timeout", json!(ACCEPT_TIMEOUT_MS)),
+        ("transport/unicast/accept_pending", json!(ACCEPT_PENDING)),
+        ("transport/unicast/max_sessions", json!(config.connections_max.get())),
+        ("transport/link/tx/lease", json!(config.lease_ms.get())),
+        ("transport/link/tx/keep_alive", json!(4)),
+        ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", json!(0)),
+        ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(WAIT_BEFORE_CLOSE_US)),
+        ("transport/link/rx/max_message_size", json!(config.message_bytes_max.get())),
+        (
+            "low_pass_filter",
+            json!([{ "flows": ["ingress"], "messages": ["put"], "key_exprs": [inputs], "size_limit": INPUT_FILTER_BYTES }]),
+        ),
+        (
+            "downsampling",
+            json!([{ "flows": ["ingress"], "messages": ["put"],
+                     "rules": [{ "key_expr": inputs, "freq": config.input_rate_max_hz.get() }] }]),
+        ),
+    ];
+    let mut zenoh = zenoh::Config::default();
+    for (key, value) in settings {
+        // Keys and types are Zenoh's own and do not depend on input beyond the ranges of `Network`; a test has them all.
+        zenoh.insert_json5(key, &value.to_string()).expect("a setting of Zenoh");
+    }
+    zenoh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::ServerConfig;
+
+    #[test]
+    fn zenoh_knows_every_setting() {
+        configuration(&ServerConfig::built_in().network, "tcp/127.0.0.1:7447");
+    }
+
+    #[test]
+    fn endpoints_are_checked() {
+        for good in ["tcp/127.0.0.1:7447", "tcp/[::1]:0", "tcp/localhost:65535"] {
+            assert_eq!(check_endpoint(good), Ok(()));
+        }
+        for bad in ["", "127.0.0.1:7447", "udp/127.0.0.1:7447", "tcp/127.0.0.1", "tcp/127.0.0.1:70000", "tcp/1.2.3:x"] {
+            assert!(check_endpoint(bad).unwrap_err().contains("tcp/ADDRESS:PORT"), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_taken_port_is_named_with_what_to_do() {
+        let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = taken.local_addr().unwrap();
+        let said = free_address(&format!("tcp/{address}"), address).unwrap_err().to_string();
+        for word in [&address.to_string(), "--listen", "pita-server status"] {
+            assert!(said.contains(word), "{said:?} lacks {word:?}");
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! The publishing thread: everything that leaves for clients without being asked for.
+//!
+//! Owns the declared publishers, one for each session and one for events, the numbering of events and the description
+//! that they add up to. It wakes for every frame, packs the state once, and puts one snapshot for each session. Nothing
+//! here waits for a client: snapshots and events are dropped where a connection takes no more.
+
+mod outlet;
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+use std::time::Duration;
+
+use pita_game::ArenaEvent;
+use pita_protocol::message::{Description, Event, EventMessage, InputAck, Role, Snapshot};
+
+use crate::answers::{Asker, Work};
+use crate::boarding::{Boarding, Ledger, Out};
+use crate::description;
+use crate::frame::Frame;
+use crate::metrics::Traffic;
+use crate::sessions::{Change, EndReason, SessionId};
+use crate::shared::{Phase, Shared};
+use outlet::Outlet;
+
+/// How long the thread sleeps where nothing wakes it; sessions time out meanwhile.
+const IDLE: Duration = Duration::from_millis(100);
+
+/// The thread's state.
+pub struct Publishing {
+    shared: Arc<Shared>,
+    session: zenoh::Session,
+    asker: Asker,
+    events: Outlet,
+    outlets: BTreeMap<u16, (SessionId, Outlet)>,
+    ledger: Ledger,
+    /// Waits for room on the way to the tick thread.
+    boarding: VecDeque<Boarding>,
+    changes: Vec<Change>,
+    description: Arc<Description>,
+    tick: u64,
+    snapshot: Snapshot,
+    has_said_closing: bool,
+}
+
+impl Publishing {
+    /// Declares the event publisher.
+    ///
+    /// # Errors
+    /// What Zenoh says.
+    pub fn new(shared: Arc<Shared>, session: zenoh::Session, asker: Asker) -> zenoh::Result<Self> {
+        let slots = shared.sessions().slots();
+        Ok(Self {
+            events: Outlet::declare(&session, shared.keys.event())?,
+            ledger: Ledger::new(slots),
+            description: shared.description(),
+            shared,
+            session,
+            asker,
+            outlets: BTreeMap::new(),
+            boarding: VecDeque::new(),
+            changes: Vec::new(),
+            tick: 0,
+            snapshot: Snapshot { tick: 0, ack: InputAck::default(), event_sequence: 0, dof: Vec::new() },
+            has_said_closing: false,
+        })
+    }
+
+    /// Publishes until the daemon has [ended](Phase::Ended).
+    pub fn run(mut self) {
+        self.shared.this_thread_publishes();
+        while self.shared.phase() != Phase::Ended {
+            self.shared.sessions().expire(self.shared.clock.ms());
+            self.follow_sessions();
+            self.take_frames();
+            if self.shared.phase() == Phase::Closing && !self.has_said_closing {
+                self.has_said_closing = true;
+                self.publish_event(Event::Closing { reason: "the server ends".to_owned() });
+            }
+            if self.shared.frames.is_drained() {
+                std::thread::park_timeout(IDLE);
+            }
+        }
+    }
+
+    // --- sessions --------------------------------------------------------------------------------------------------
+
+    /// Acts on sessions that began or ended, unless the tick thread has not taken the last ones yet.
+    fn follow_sessions(&mut self) {
+        if self.boarding.is_empty() {
+            let mut changes = std::mem::take(&mut self.changes);
+            self.shared.sessions().take_changes(&mut changes);
+            for change in changes.drain(..) {
+                match change {
+                    Change::Began { id, role, name } => self.begin_session(id, role, name),
+                    Change::Ended { id, role, reason } => self.end_session(id, role, reason),
+                }
+            }
+            self.changes = changes;
+        }
+        while let Some(boarding) = self.boarding.pop_front() {
+            if let Err(full) = self.shared.boarding.push(boarding) {
+                self.boarding.push_front(full);
+                break;
+            }
+        }
+    }
+
+    fn begin_session(&mut self, id: SessionId, role: Role, name: String) {
+        match Outlet::declare(&self.session, self.shared.keys.snapshot(id.slot)) {
+            Ok(outlet) => drop(self.outlets.insert(id.slot, (id, outlet))),
+            Err(reason) => tracing::error!("no publisher for slot {}: {reason}", id.slot),
+        }
+        tracing::info!("slot {}: {name:?} joins as {role:?}", id.slot);
+        match role {
+            Role::Player => self.board(Boarding::Enter { id, name }),
+            Role::Spectator => {
+                self.publish_event(Event::Joined { slot: id.slot, name });
+                self.admit(id);
+            }
+        }
+    }
+
+    fn end_session(&mut self, id: SessionId, role: Role, reason: EndReason) {
+        self.outlets.remove(&id.slot);
+        self.asker.tell(Work::Ended(id));
+        tracing::info!("slot {}: ended, {reason}", id.slot);
+        let (slot, text) = (id.slot, reason.to_string());
+        match (role, reason) {
+            // The arena never had it.
+            (Role::Player, EndReason::NoPlace) => {}
+            (Role::Player, _) => self.board(Boarding::Leave { slot, reason: text }),
+            (Role::Spectator, _) => self.publish_event(Event::Left { slot, reason: text }),
+        }
+    }
+
+    fn board(&mut self, boarding: Boarding) {
+        self.ledger.sent(&boarding);
+        self.boarding.push_back(boarding);
+    }
+
+    /// Answers the join of `id`: from now on it is in.
+    fn admit(&mut self, id: SessionId) {
+        Arc::make_mut(&mut self.description).tick = self.tick;
+        let actor = description::actor_of(&self.description, id.slot);
+        self.asker.tell(Work::Admitted { id, actor, description: self.description.clone() });
+    }
+
+    // --- frames ----------------------------------------------------------------------------------------------------
+
+    /// Publishes the events of all waiting frames and the state of the newest.
+    fn take_frames(&mut self) {
+        while let Some(mut frame) = self.shared.frames.take_filled() {
+            self.tick = frame.tick;
+            for event in frame.events.drain(..) {
+                self.take_arena_event(event);
+            }
+            if self.shared.frames.is_drained() {
+                self.publish_snapshots(&mut frame);
+            }
+            self.measure(&frame);
+            self.shared.frames.put_free(frame);
+        }
+    }
+
+    fn take_arena_event(&mut self, event: ArenaEvent) {
+        match event {
+            ArenaEvent::ActorAdded(actor) => self.publish_event(Event::ActorAdded(description::actor(&actor))),
+            ArenaEvent::ActorRemoved(id) => self.publish_event(Event::ActorRemoved { id }),
+            ArenaEvent::Entered { slot, name } => {
+                self.publish_event(Event::Joined { slot, name });
+                if let Some(id) = self.ledger.entered(slot) {
+                    self.admit(id);
+                }
+            }
+            ArenaEvent::Left { slot, reason } => match self.ledger.out(slot) {
+                Out::Left => self.publish_event(Event::Left { slot, reason }),
+                Out::Refused(id) => {
+                    tracing::warn!("slot {slot}: the arena refused the player: {reason}");
+                    self.shared.sessions().refused_by_arena(id);
+                }
+            },
+        }
+    }
+
+    fn publish_event(&mut self, event: Event) {
+        let sequence = self.description.event_sequence.wrapping_add(1);
+        description::apply(Arc::make_mut(&mut self.description), &event, sequence, self.tick);
+        self.shared.set_description(self.description.clone());
+        let bytes = pita_protocol::encode(&EventMessage { sequence, tick: self.tick, event });
+        self.shared.counters.sent_bytes.add((bytes.len() * self.outlets.len()) as u64);
+        self.events.put(bytes);
+    }
+
+    /// The same state for every session, with its own acknowledgement.
+    fn publish_snapshots(&mut self, frame: &mut Frame) {
+        if self.outlets.is_empty() {
+            return;
+        }
+        self.snapshot.dof.clear();
+        frame.pack_dof(&mut self.snapshot.dof);
+        self.snapshot.tick = frame.tick;
+        self.snapshot.event_sequence = self.description.event_sequence;
+        for (id, outlet) in self.outlets.values() {
+            // Acknowledgements are in order of slot.
+            let found = frame.acks.binary_search_by_key(&id.slot, |(acked, _)| acked.slot).map(|at| frame.acks[at]);
+            self.snapshot.ack = found.ok().filter(|(acked, _)| acked == id).map(|(_, ack)| ack).unwrap_or_default();
+            let bytes = pita_protocol::encode(&self.snapshot);
+            self.shared.counters.sent_bytes.add(bytes.len() as u64);
+            outlet.put(bytes);
+        }
+    }
+
+    fn measure(&mut self, frame: &Frame) {
+        let counters = &self.shared.counters;
+        let (sent, received) = (counters.sent_bytes.get(), counters.received_bytes.get());
+        let mut metrics = self.shared.metrics();
+        // There are no more outlets than slots.
+        metrics.add_frame(frame, self.outlets.len() as u16);
+        metrics.add_traffic(Traffic { at_ms: self.shared.clock.ms(), sent, received });
+    }
+}

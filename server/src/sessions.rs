@@ -1,0 +1,304 @@
+//! Sessions: who holds which slot, with which key, and when a session ends.
+//!
+//! A pure state machine. Times come in as milliseconds of a monotonic clock, secrets come in from outside; it knows no
+//! network and no thread. What happens is queued as [`Change`]s, and a slot is given away again only after the
+//! [`Change::Ended`] of its last session was taken: that bounds the queue and keeps the order of a slot's sessions.
+
+use pita_protocol::message::{Controls, InputPacket, Role, buttons};
+use pita_protocol::seal::SessionKey;
+
+/// Limits of the state machine. Both kinds of slots together are at most `u16::MAX`.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Slots of players: the lowest numbers, because the arena counts its players by slot.
+    pub players: u16,
+    /// Slots of spectators, above those of the players.
+    pub spectators: u16,
+    /// Silence after which a session ends, ms.
+    pub input_timeout_ms: u64,
+    /// Input packets that are looked at between two ticks.
+    pub input_packets_per_tick: u32,
+}
+
+/// One session, named for good: a slot is used again, a pair of slot and epoch is not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct SessionId {
+    /// Number of the place.
+    pub slot: u16,
+    /// Tells the sessions of one slot apart.
+    pub epoch: u32,
+}
+
+/// Why a session ended; its text is for a person.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EndReason {
+    /// The client said so.
+    Left,
+    /// Its liveliness token is gone.
+    ConnectionLost,
+    /// The arena had no place for it.
+    NoPlace,
+    /// Nothing was heard of it for the time given, ms.
+    Silent {
+        /// The timeout.
+        timeout_ms: u64,
+    },
+}
+
+impl std::fmt::Display for EndReason {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Left => f.write_str("left"),
+            Self::ConnectionLost => f.write_str("connection lost"),
+            Self::NoPlace => f.write_str("no place in the arena"),
+            Self::Silent { timeout_ms } => write!(f, "no input for {} s", *timeout_ms as f64 / 1000.0),
+        }
+    }
+}
+
+/// What happened, for those who act on it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// A session began.
+    Began {
+        /// The session.
+        id: SessionId,
+        /// What it is.
+        role: Role,
+        /// Its name.
+        name: String,
+    },
+    /// A session ended.
+    Ended {
+        /// The session.
+        id: SessionId,
+        /// What it was.
+        role: Role,
+        /// Why.
+        reason: EndReason,
+    },
+}
+
+/// What an input packet said.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Received {
+    /// New controls.
+    Input {
+        /// Newest sequence in the packet.
+        sequence: u32,
+        /// The controls of that sequence; [`buttons::RESET`] is set if any frame that is new has it, so that a press
+        /// of one tick is not lost with one packet.
+        controls: Controls,
+    },
+    /// The session ended with this packet.
+    Left,
+}
+
+/// Why an authentic input packet was not used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InputRefusal {
+    /// No such session, or another epoch of the slot.
+    NoSession,
+    /// Nothing new in it.
+    Stale,
+    /// Too many between two ticks.
+    Flood,
+}
+
+/// All slots.
+pub struct Sessions {
+    limits: Limits,
+    slots: Vec<Slot>,
+    next_epoch: u32,
+    closing: bool,
+    changes: Vec<Change>,
+}
+
+enum Slot {
+    Free,
+    Taken(Session),
+    /// Its session's end has not been taken yet.
+    Ended,
+}
+
+struct Session {
+    epoch: u32,
+    key: SessionKey,
+    role: Role,
+    heard_ms: u64,
+    has_shown_token: bool,
+    last_sequence: u32,
+    packets_tick: u64,
+    packets: u32,
+}
+
+/// Why nobody can join.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JoinRefusal {
+    /// Every slot of the role is taken.
+    Full,
+    /// The server ends.
+    Closing,
+}
+
+impl Sessions {
+    /// Empty slots.
+    pub fn new(limits: Limits) -> Self {
+        let slots = (0..limits.players + limits.spectators).map(|_| Slot::Free).collect();
+        Self { limits, slots, next_epoch: 1, closing: false, changes: Vec::new() }
+    }
+
+    /// Begins a session on the lowest free slot of its role; `key` will seal its inputs.
+    ///
+    /// # Errors
+    /// [`JoinRefusal`].
+    pub fn join(&mut self, name: &str, role: Role, key: SessionKey, now_ms: u64) -> Result<SessionId, JoinRefusal> {
+        if self.closing {
+            return Err(JoinRefusal::Closing);
+        }
+        let slots = match role {
+            Role::Player => 0..self.limits.players,
+            Role::Spectator => self.limits.players..self.slots(),
+        };
+        let is_free = |slot: &u16| matches!(self.slots[usize::from(*slot)], Slot::Free);
+        let slot = slots.into_iter().find(is_free).ok_or(JoinRefusal::Full)?;
+        let id = SessionId { slot, epoch: self.next_epoch };
+        self.next_epoch = self.next_epoch.wrapping_add(1);
+        self.slots[usize::from(slot)] = Slot::Taken(Session {
+            epoch: id.epoch,
+            key,
+            role,
+            heard_ms: now_ms,
+            has_shown_token: false,
+            last_sequence: 0,
+            packets_tick: 0,
+            packets: 0,
+        });
+        self.changes.push(Change::Began { id, role, name: name.to_owned() });
+        Ok(id)
+    }
+
+    /// Key of the session that holds `slot`.
+    pub fn key(&self, slot: u16) -> Option<&SessionKey> {
+        match self.slots.get(usize::from(slot))? {
+            Slot::Taken(session) => Some(&session.key),
+            Slot::Free | Slot::Ended => None,
+        }
+    }
+
+    /// Takes an authentic packet for `slot`, received at `now_ms` while tick `tick` was the coming one.
+    ///
+    /// # Errors
+    /// [`InputRefusal`].
+    pub fn receive(
+        &mut self,
+        slot: u16,
+        packet: &InputPacket,
+        tick: u64,
+        now_ms: u64,
+    ) -> Result<Received, InputRefusal> {
+        let id = SessionId { slot, epoch: packet.epoch };
+        let packets_max = self.limits.input_packets_per_tick;
+        let session = self.session_mut(id).ok_or(InputRefusal::NoSession)?;
+        if session.packets_tick != tick {
+            (session.packets_tick, session.packets) = (tick, 0);
+        }
+        session.packets += 1;
+        if session.packets > packets_max {
+            return Err(InputRefusal::Flood);
+        }
+        if packet.leave {
+            self.end(id, EndReason::Left);
+            return Ok(Received::Left);
+        }
+        let mut fresh = packet.frames.iter().filter(|frame| frame.sequence > session.last_sequence);
+        let newest = packet.frames.last().filter(|frame| frame.sequence > session.last_sequence);
+        let newest = newest.ok_or(InputRefusal::Stale)?;
+        let mut controls = newest.controls;
+        if fresh.any(|frame| frame.controls.buttons & buttons::RESET != 0) {
+            controls.buttons |= buttons::RESET;
+        }
+        session.last_sequence = newest.sequence;
+        session.heard_ms = now_ms;
+        Ok(Received::Input { sequence: newest.sequence, controls })
+    }
+
+    /// The session's liveliness token has been seen.
+    pub fn token_appeared(&mut self, id: SessionId) {
+        if let Some(session) = self.session_mut(id) {
+            session.has_shown_token = true;
+        }
+    }
+
+    /// The session's liveliness token is gone: ends it.
+    pub fn token_disappeared(&mut self, id: SessionId) {
+        self.end(id, EndReason::ConnectionLost);
+    }
+
+    /// The arena refused the player: ends the session.
+    pub fn refused_by_arena(&mut self, id: SessionId) {
+        self.end(id, EndReason::NoPlace);
+    }
+
+    /// Ends sessions of which nothing was heard: players without input, spectators that never showed their token.
+    pub fn expire(&mut self, now_ms: u64) {
+        let timeout_ms = self.limits.input_timeout_ms;
+        for slot in 0..self.slots() {
+            let Slot::Taken(session) = &self.slots[usize::from(slot)] else { continue };
+            let must_speak = session.role == Role::Player || !session.has_shown_token;
+            if must_speak && now_ms.saturating_sub(session.heard_ms) > timeout_ms {
+                self.end(SessionId { slot, epoch: session.epoch }, EndReason::Silent { timeout_ms });
+            }
+        }
+    }
+
+    /// From now on nobody joins.
+    pub fn close(&mut self) {
+        self.closing = true;
+    }
+
+    /// Moves what happened since the last call to the end of `into`, in order, and frees the slots of ended sessions.
+    pub fn take_changes(&mut self, into: &mut Vec<Change>) {
+        into.append(&mut self.changes);
+        for slot in &mut self.slots {
+            if matches!(slot, Slot::Ended) {
+                *slot = Slot::Free;
+            }
+        }
+    }
+
+    /// Sessions now.
+    pub fn count(&self) -> usize {
+        self.slots.iter().filter(|slot| matches!(slot, Slot::Taken(_))).count()
+    }
+
+    /// Slots for `role`.
+    pub fn slots_of(&self, role: Role) -> u16 {
+        match role {
+            Role::Player => self.limits.players,
+            Role::Spectator => self.limits.spectators,
+        }
+    }
+
+    /// Number of slots.
+    pub fn slots(&self) -> u16 {
+        self.limits.players + self.limits.spectators
+    }
+
+    fn session_mut(&mut self, id: SessionId) -> Option<&mut Session> {
+        match self.slots.get_mut(usize::from(id.slot))? {
+            Slot::Taken(session) if session.epoch == id.epoch => Some(session),
+            _ => None,
+        }
+    }
+
+    fn end(&mut self, id: SessionId, reason: EndReason) {
+        let Some(session) = self.session_mut(id) else { return };
+        let role = session.role;
+        self.slots[usize::from(id.slot)] = Slot::Ended;
+        self.changes.push(Change::Ended { id, role, reason });
+    }
+}
+
+#[cfg(test)]
+mod tests;
