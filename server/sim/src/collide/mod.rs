@@ -90,6 +90,15 @@ pub(crate) struct ContactPoint {
     feature: u32,
 }
 
+impl ContactPoint {
+    /// A new point without a history between bodies that do not matter.
+    #[cfg(test)]
+    pub fn at(position: DVec3, normal: DVec3, gap: f64, friction: f64) -> Self {
+        let (a, b, feature) = (0, Partner::Static(0), 0);
+        Self { a, b, position, normal, gap, friction, anchor: DVec3::ZERO, normal_force: 0.0, feature }
+    }
+}
+
 struct Static {
     serial: u32,
     collider: Collider,

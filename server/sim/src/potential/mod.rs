@@ -233,3 +233,188 @@ pub(crate) fn geometric_stiffness(force: DVec3, arm: DVec3) -> DMat3 {
 pub(crate) fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+    use proptest::prelude::*;
+
+    use super::axle::AxleTerm;
+    use super::ball_joint::BallJointTerm;
+    use super::contact::ContactTerm;
+    use super::spring::SpringTerm;
+    use super::*;
+    use crate::collide::ContactPoint;
+    use crate::settings::ContactSettings;
+
+    const DT: f64 = 1.0 / 30.0;
+
+    fn moved(trial: &[Trial; 2], coordinate: usize, h: f64) -> [Trial; 2] {
+        let mut trial = *trial;
+        let (body, axis) = (&mut trial[coordinate / 6], DVec3::AXES[coordinate % 3]);
+        if coordinate % 6 < 3 {
+            body.pose.position += axis * h;
+            body.twist.linear += axis * (h / DT);
+        } else {
+            body.pose.rotation = DQuat::from_scaled_axis(axis * h) * body.pose.rotation;
+            body.twist.angular += axis * (h / DT);
+        }
+        trial
+    }
+
+    fn flat(wrenches: [Wrench; 2]) -> [f64; 12] {
+        let mut flat = [0.0; 12];
+        for (body, wrench) in wrenches.into_iter().enumerate() {
+            flat[6 * body..6 * body + 3].copy_from_slice(&wrench.force.to_array());
+            flat[6 * body + 3..6 * body + 6].copy_from_slice(&wrench.torque.to_array());
+        }
+        flat
+    }
+
+    /// The gradient is the energy's, by central differences.
+    fn check_gradient(term: &impl Term, trial: &[Trial; 2]) {
+        let gradient = flat(term.evaluate(&Candidate { dt: DT, trial }).1);
+        let size = gradient.iter().fold(1e-9, |size: f64, g| size.max(g.abs()));
+        for (coordinate, expected) in gradient.into_iter().enumerate() {
+            let h = 1e-6;
+            let energy = |h| term.evaluate(&Candidate { dt: DT, trial: &moved(trial, coordinate, h) }).0;
+            let difference = (energy(h) - energy(-h)) / (2.0 * h);
+            assert!((difference - expected).abs() < 1e-4 * size, "coordinate {coordinate}: {difference} {expected}");
+        }
+    }
+
+    /// The Hessian is the gradient's derivative, by central differences, to a fraction of its largest entry.
+    fn check_hessian(term: &impl Term, trial: &[Trial; 2], accuracy: f64) {
+        let PairBlocks { aa, ab, bb } = term.hessian(&Candidate { dt: DT, trial });
+        let entry = |i: usize, j: usize| match (i / 6, j / 6) {
+            (0, 0) => aa[i][j],
+            (0, _) => ab[i][j - 6],
+            (_, 0) => ab[j][i - 6],
+            _ => bb[i - 6][j - 6],
+        };
+        let size = (0..12).map(|i| entry(i, i)).fold(1e-9, f64::max);
+        for j in 0..12 {
+            let h = 1e-7;
+            let gradient = |h| flat(term.evaluate(&Candidate { dt: DT, trial: &moved(trial, j, h) }).1);
+            let (above, below) = (gradient(h), gradient(-h));
+            for i in 0..12 {
+                let difference = (above[i] - below[i]) / (2.0 * h);
+                let expected = entry(i, j);
+                assert!(
+                    (difference - expected).abs() < accuracy * size,
+                    "({i}, {j}): {difference} {expected} of {size}"
+                );
+            }
+        }
+    }
+
+    fn vector() -> impl Strategy<Value = DVec3> {
+        prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from_array)
+    }
+
+    fn trial() -> impl Strategy<Value = Trial> {
+        (vector(), vector(), vector(), vector()).prop_map(|(position, turn, linear, angular)| Trial {
+            pose: Pose { position: position * 3.0, rotation: DQuat::from_scaled_axis(turn * 2.0) },
+            twist: Twist { linear, angular },
+        })
+    }
+
+    fn node(mass: f64, inertia: DVec3, start: Pose) -> Node {
+        Node {
+            start,
+            free_rotation: start.rotation,
+            free_spin: DVec3::ZERO,
+            target: Twist::REST,
+            before: Twist::REST,
+            mass,
+            inertia: DMat3::from_diagonal(inertia),
+            inverse_inertia: DMat3::from_diagonal(inertia.recip()),
+            rotates: true,
+            wheel_axis: None,
+        }
+    }
+
+    fn spring(a: DVec3, b: DVec3, rest_length: f64, start: [Pose; 2]) -> SpringTerm {
+        // The anchors' bodies do not matter to the term.
+        let (a, b) = (Anchor::world(a), Anchor::world(b));
+        SpringTerm::new([0, 1], SpringDesc { a, b, rest_length, stiffness: 300.0, damping: 7.0 }, start)
+    }
+
+    fn contact(normal: DVec3, gap: f64, anchor: DVec3, arms: [DVec3; 2], normal_force: f64) -> ContactTerm {
+        let mut point = ContactPoint::at(DVec3::ZERO, normal, gap, 0.7);
+        (point.anchor, point.normal_force) = (anchor - normal * normal.dot(anchor), normal_force);
+        ContactTerm::new([0, 1], &point, arms, 2.0, &ContactSettings::default(), DT)
+    }
+
+    proptest! {
+        #[test]
+        fn spring_derives(a in vector(), b in vector(), rest in 0.0..2.0, s in trial(), t in trial(), u in trial()) {
+            let term = spring(a, b, rest, [s.pose, t.pose]);
+            check_gradient(&term, &[t, u]);
+        }
+
+        #[test]
+        fn spring_between_centres_has_the_exact_hessian_in_tension(t in trial(), u in trial()) {
+            prop_assume!((t.pose.position - u.pose.position).length() > 0.1);
+            let desc = SpringDesc { damping: 0.0, ..spring(DVec3::ZERO, DVec3::ZERO, 0.0, [t.pose, u.pose]).desc };
+            check_hessian(&SpringTerm::new([0, 1], desc, [t.pose, u.pose]), &[t, u], 1e-5);
+        }
+
+        #[test]
+        fn ball_joint_derives(a in vector(), b in vector(), t in trial(), u in trial()) {
+            check_gradient(&BallJointTerm::new([0, 1], [a, b], 1e3, DVec3::ZERO), &[t, u]);
+        }
+
+        #[test]
+        fn closed_ball_joint_has_the_exact_hessian(a in vector(), b in vector(), t in trial(), mut u in trial()) {
+            u.pose.position = t.pose.point(a) - u.pose.rotation * b;
+            let mut term = BallJointTerm::new([0, 1], [a, b], 1e3, DVec3::ZERO);
+            let trial = [t, u];
+            term.relinearise(&Candidate { dt: DT, trial: &trial });
+            check_hessian(&term, &trial, 1e-5);
+        }
+
+        #[test]
+        fn axle_derives(t in trial(), u in trial(), hub in vector(), steer in -1.0..1.0, target in -3.0..3.0, brake in 0.0..200.0) {
+            let control = AxleControl { steer, drive: Motor { target_speed: target, gain: 60.0, max_torque: 90.0 }, brake };
+            let (chassis, wheel) = (BodyId::default(), BodyId::default());
+            let desc = AxleDesc { chassis, wheel, hub, stiffness: 400.0, damping: 30.0, control };
+            let nodes = [node(10.0, DVec3::new(1.0, 2.0, 2.5), t.pose), node(1.0, DVec3::new(0.1, 0.1, 0.2), u.pose)];
+            let term = AxleTerm::new([0, 1], &desc, &nodes, 3.0, DT);
+            check_gradient(&term, &[t, u]);
+        }
+
+        #[test]
+        fn contact_derives(
+            n in vector(), gap in -0.05..0.02, anchor in vector(), a in vector(), b in vector(), force in 0.0..1e4,
+            t in trial(), u in trial(),
+        ) {
+            prop_assume!(n.length() > 0.1);
+            let slow = |t: Trial| Trial { twist: Twist { linear: t.twist.linear * 0.3, angular: t.twist.angular * 0.3 }, ..t };
+            let term = contact(n.normalize(), gap, anchor * 0.01, [a, b], force);
+            check_gradient(&term, &[slow(t), slow(u)]);
+        }
+
+        #[test]
+        fn frictionless_contact_has_the_exact_hessian(n in vector(), a in vector(), b in vector(), t in trial(), u in trial()) {
+            prop_assume!(n.length() > 0.1);
+            check_hessian(&contact(n.normalize(), -0.1, DVec3::ZERO, [a, b], 0.0), &[t, u], 1e-4);
+        }
+
+        #[test]
+        fn geometric_stiffness_is_the_positive_part(f in vector(), r in vector()) {
+            let along = f.dot(r);
+            let whole = (outer(f, r) + outer(r, f)) * 0.5 - DMat3::from_diagonal(DVec3::splat(along));
+            let positive = geometric_stiffness(f, r);
+            let negative = positive - whole;
+            // Both parts are semidefinite, and they are orthogonal to each other.
+            for part in [positive, negative] {
+                for x in [DVec3::X, DVec3::Y, DVec3::Z, f, r, f + r, f - r, f.cross(r)] {
+                    prop_assert!(x.dot(part * x) > -1e-9, "{part}");
+                }
+            }
+            let product = positive * negative;
+            prop_assert!(product.x_axis.length() + product.y_axis.length() + product.z_axis.length() < 1e-6);
+        }
+    }
+}
