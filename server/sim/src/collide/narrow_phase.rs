@@ -58,8 +58,8 @@ impl NarrowPhase {
 
     /// Contacts of two bodies.
     pub fn bodies(&mut self, a: &Moving, b: &Moving, settings: &Settings) {
-        let closing = (a.twist.linear - b.twist.linear).length() + spin_speed(a) + spin_speed(b);
-        let margin = margin(closing, settings);
+        let margin =
+            margin((a.twist.linear - b.twist.linear).length(), reach(a, settings) + reach(b, settings), settings);
         self.manifold.clear();
         let pair = self.take(a.serial, Partner::Body(b.serial));
         self.parry(pair, (a.collider, a.pose), (b.collider, b.pose), margin);
@@ -68,7 +68,7 @@ impl NarrowPhase {
 
     /// Contacts of a body with a piece of static geometry.
     pub fn with_static(&mut self, a: &Moving, serial: u32, piece: &Collider, pose: Pose, settings: &Settings) {
-        let margin = margin(a.twist.linear.length() + spin_speed(a), settings);
+        let margin = margin(a.twist.linear.length(), reach(a, settings), settings);
         self.manifold.clear();
         if let Shape::HalfSpace { normal } = piece.shape() {
             let normal = pose.rotation * *normal;
@@ -180,11 +180,13 @@ impl NarrowPhase {
     }
 }
 
-fn margin(closing_speed: f64, settings: &Settings) -> f64 {
-    settings.contact.margin + settings.dt * (closing_speed + settings.dt * settings.gravity.length())
+/// Widest gap that a tick may close, m, for bodies that close at `speed` and reach so much farther by turning.
+fn margin(speed: f64, reach: f64, settings: &Settings) -> f64 {
+    settings.contact.margin + settings.dt * (speed + settings.dt * settings.gravity.length()) + reach
 }
 
-fn spin_speed(body: &Moving) -> f64 {
+/// How far a point of the body's surface may get in a tick by turning alone, m.
+fn reach(body: &Moving, settings: &Settings) -> f64 {
     // A surface of revolution stays where it is however fast it spins about its axis.
     let spin = body.twist.angular;
     let across = match body.collider.shape() {
@@ -193,7 +195,7 @@ fn spin_speed(body: &Moving) -> f64 {
         Shape::Capsule { .. } => spin.reject_from_normalized(body.pose.rotation * DVec3::X),
         _ => spin,
     };
-    across.length() * body.collider.bounding_radius()
+    (settings.dt * across.length()).min(2.0) * body.collider.bounding_radius()
 }
 
 fn friction(a: &Collider, b: &Collider) -> f64 {

@@ -130,7 +130,10 @@ impl Integrator {
             let all = &solve.problem.nodes;
             let arms = nodes.map(|i| arm(all, i, contact.position));
             let mass = reduced_mass(all, nodes);
-            solve.problem.terms.contacts.push(ContactTerm::new(nodes, contact, arms, mass, contact_settings, *dt));
+            let speeds = [0, 1].map(|i| before(all, nodes[i]).at(arms[i]));
+            let closing = contact.normal.dot(speeds[0] - speeds[1]);
+            let term = ContactTerm::new(nodes, contact, arms, mass, closing, contact_settings, *dt);
+            solve.problem.terms.contacts.push(term);
             solve.contacts.push(source);
         }
         for desc in scene.potentials.springs.values() {
@@ -267,6 +270,10 @@ fn ends(scene: &Scene, a: Option<BodyId>, b: Option<BodyId>) -> Option<[u32; 2]>
 
 fn pose(nodes: &[Node], node: NodeIndex) -> crate::dof::Pose {
     if node == FIXED { crate::dof::Pose::IDENTITY } else { nodes[node as usize].start }
+}
+
+fn before(nodes: &[Node], node: NodeIndex) -> crate::dof::Twist {
+    nodes.get(node as usize).map_or(crate::dof::Twist::REST, |node| node.before)
 }
 
 /// From a body's centre of mass to a point; none for what does not turn.

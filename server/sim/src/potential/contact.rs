@@ -13,6 +13,9 @@ use crate::settings::ContactSettings;
 /// Slip at which friction is saturated, in units of limit / stiffness: where x − 4/27 x³ peaks.
 const SATURATION: f64 = 1.5;
 
+/// Most that an impact stiffens a contact, in reduced masses per dt²: 1000 m/s at 30 Hz.
+const STIFFEST: f64 = 4e4;
+
 /// A contact point in an island.
 #[derive(Clone, Debug)]
 pub(crate) struct ContactTerm {
@@ -60,22 +63,26 @@ fn friction_patch(x: f64) -> (f64, f64, f64) {
 }
 
 impl ContactTerm {
-    /// `mass` is the reduced mass of the pair, kg.
+    /// `mass` is the reduced mass of the pair, kg; `closing_speed` how fast the point closes at the start, m/s.
     pub fn new(
         nodes: [NodeIndex; 2],
         point: &crate::collide::ContactPoint,
         arms: [DVec3; 2],
         mass: f64,
+        closing_speed: f64,
         settings: &ContactSettings,
         dt: f64,
     ) -> Self {
         let unit = mass / (dt * dt);
+        // Stopping what would get so deep takes a depth of overlap / stiffness: that shall not exceed the transition.
+        let overlap = closing_speed * dt - point.gap.max(0.0);
+        let stiffness = settings.normal_stiffness.max((overlap / settings.transition).min(STIFFEST));
         Self {
             nodes,
             arms,
             normal: point.normal,
             start_gap: point.gap.max(-settings.recovery_speed * dt),
-            normal_stiffness: settings.normal_stiffness * unit,
+            normal_stiffness: stiffness * unit,
             tangent_stiffness: settings.tangent_stiffness * unit,
             transition: settings.transition,
             friction: point.friction,

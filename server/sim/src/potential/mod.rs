@@ -343,7 +343,7 @@ mod tests {
     fn contact(normal: DVec3, gap: f64, anchor: DVec3, arms: [DVec3; 2], normal_force: f64) -> ContactTerm {
         let mut point = ContactPoint::at(DVec3::ZERO, normal, gap, 0.7);
         (point.anchor, point.normal_force) = (anchor - normal * normal.dot(anchor), normal_force);
-        ContactTerm::new([0, 1], &point, arms, 2.0, &ContactSettings::default(), DT)
+        ContactTerm::new([0, 1], &point, arms, 2.0, 0.0, &ContactSettings::default(), DT)
     }
 
     proptest! {

@@ -1,0 +1,107 @@
+//! What must not hurt: bad arguments, stale handles, absurd speeds.
+
+use pita_sim::{
+    Anchor, AxleControl, AxleDesc, BallJointDesc, DQuat, DVec3, ParticleDesc, RigidBodyDesc, Settings, Shape, SimError,
+    SpringDesc, StaticDesc, World,
+};
+
+use super::{cube, ground, particle, world};
+
+fn refused<T>(result: Result<T, SimError>, expected: &str) {
+    match result {
+        Ok(_) => panic!("accepted, expected: {expected}"),
+        Err(error) => assert!(error.to_string().contains(expected), "{error}, expected: {expected}"),
+    }
+}
+
+#[test]
+fn bad_values_are_named() {
+    let mut world = world();
+    let good = RigidBodyDesc::new(DVec3::ZERO, 1.0, DVec3::ONE);
+    refused(world.add_rigid_body(RigidBodyDesc { mass: 0.0, ..good.clone() }), "mass is 0, allowed is above 0 kg");
+    refused(world.add_rigid_body(RigidBodyDesc { mass: f64::NAN, ..good.clone() }), "mass is NaN");
+    refused(
+        world.add_rigid_body(RigidBodyDesc { inertia: DVec3::new(1.0, -1.0, 1.0), ..good.clone() }),
+        "inertia is -1",
+    );
+    refused(world.add_rigid_body(RigidBodyDesc { position: DVec3::NAN, ..good.clone() }), "position is NaN");
+    refused(world.add_rigid_body(RigidBodyDesc { velocity: DVec3::X * 1e10, ..good.clone() }), "velocity is 1");
+    let rotation = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
+    refused(world.add_rigid_body(RigidBodyDesc { rotation, ..good }), "rotation is 0");
+    let shape = Shape::Ball { radius: -1.0 };
+    let piece = StaticDesc { shape, position: DVec3::ZERO, rotation: DQuat::IDENTITY, friction: 0.5 };
+    refused(world.add_static(piece), "radius is -1");
+    let position = DVec3::INFINITY;
+    refused(
+        world.add_particle(ParticleDesc { position, velocity: DVec3::ZERO, mass: 1.0, collider: None }),
+        "position",
+    );
+    refused(World::new(Settings::at(0.0)), "dt is 0");
+    refused(World::new(Settings { threads: 0, ..Settings::at(0.1) }), "threads is 0, allowed is 1 to 64");
+}
+
+#[test]
+fn joints_to_nothing_are_refused() {
+    let mut world = world();
+    let (a, b) = (cube(&mut world, DVec3::ZERO), cube(&mut world, DVec3::X * 2.0));
+    let p = particle(&mut world, DVec3::Y, DVec3::ZERO, 1.0);
+    let joint = |a, b| BallJointDesc { a: Anchor::body(a, DVec3::ZERO), b: Anchor::body(b, DVec3::X) };
+    refused(world.add_ball_joint(joint(a, a)), "both ends are at the same body");
+    refused(world.add_ball_joint(joint(a, p)), "a particle has no point but its own");
+    let ends = (Anchor::world(DVec3::ZERO), Anchor::world(DVec3::X));
+    refused(
+        world.add_spring(SpringDesc { a: ends.0, b: ends.1, rest_length: 1.0, stiffness: 1.0, damping: 0.0 }),
+        "same",
+    );
+    let control = AxleControl { steer: f64::NAN, ..AxleControl::default() };
+    let axle = AxleDesc { chassis: a, wheel: b, hub: DVec3::ZERO, stiffness: 1.0, damping: 1.0, control };
+    refused(world.add_axle(axle), "steer is NaN");
+    world.remove_body(b);
+    refused(world.add_ball_joint(joint(a, b)), "does not exist");
+    refused(world.set_velocity(b, DVec3::ZERO, DVec3::ZERO), "does not exist");
+    assert_eq!(world.position(b), None);
+}
+
+/// A handle of a removed body does not reach the body that took its place.
+#[test]
+fn handles_go_stale() {
+    let mut world = world();
+    let old = cube(&mut world, DVec3::ZERO);
+    let serial = world.serial(old);
+    world.remove_body(old);
+    let new = cube(&mut world, DVec3::X);
+    assert_ne!(old, new);
+    assert_eq!(world.velocity(old), None);
+    assert_ne!(world.serial(new), serial);
+}
+
+/// The fastest spins and speeds that are accepted neither hang a tick nor hurt the neighbours.
+#[test]
+fn absurd_motion_is_survived() {
+    let mut world = world();
+    ground(&mut world);
+    let bystander = cube(&mut world, DVec3::new(-50.0, 0.5, 0.0));
+    let wild = cube(&mut world, DVec3::Y * 0.6);
+    let spin = DVec3::new(1e8, -9e8, 3e8);
+    world.set_velocity(wild, DVec3::new(9e8, -9e8, 1.0), spin).unwrap();
+    for _ in 0..30 {
+        world.step();
+    }
+    let here = world.position(bystander).unwrap();
+    assert!((here - DVec3::new(-50.0, 0.5, 0.0)).length() < 1e-2, "{here}");
+    assert!(world.slices().all(|slice| slice.q.iter().chain(slice.v).all(|x| x.is_finite())));
+}
+
+/// Bodies inside one another are pushed apart at no more than the recovery speed a contact: four of them here.
+#[test]
+fn boxes_inside_one_another_do_not_explode() {
+    let mut world = world();
+    ground(&mut world);
+    let boxes: Vec<_> = (0..5).map(|i| cube(&mut world, DVec3::new(0.0, 0.5 + 0.01 * f64::from(i), 0.0))).collect();
+    for _ in 0..300 {
+        world.step();
+        for &id in &boxes {
+            assert!(world.velocity(id).unwrap().length() < 12.5, "{}", world.velocity(id).unwrap());
+        }
+    }
+}

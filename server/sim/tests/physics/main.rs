@@ -1,0 +1,39 @@
+//! The engine against closed forms, conservation laws and itself.
+
+mod closed_form;
+mod collisions;
+mod determinism;
+mod hostile;
+mod joints;
+
+use pita_sim::{BodyId, Collider, DQuat, DVec3, ParticleDesc, RigidBodyDesc, Settings, Shape, StaticDesc, World};
+
+/// The talk's tick, s.
+const DT: f64 = 1.0 / 30.0;
+
+fn world() -> World {
+    World::new(Settings::at(DT)).unwrap()
+}
+
+fn weightless() -> World {
+    World::new(Settings { gravity: DVec3::ZERO, ..Settings::at(DT) }).unwrap()
+}
+
+fn particle(world: &mut World, position: DVec3, velocity: DVec3, mass: f64) -> BodyId {
+    world.add_particle(ParticleDesc { position, velocity, mass, collider: None }).unwrap()
+}
+
+fn body(world: &mut World, shape: Shape, mass: f64, position: DVec3, friction: f64) -> BodyId {
+    let inertia = shape.inertia(mass);
+    let collider = Some(Collider::new(shape, friction));
+    world.add_rigid_body(RigidBodyDesc { collider, ..RigidBodyDesc::new(position, mass, inertia) }).unwrap()
+}
+
+fn cube(world: &mut World, position: DVec3) -> BodyId {
+    body(world, Shape::Box { half: DVec3::splat(0.5) }, 1000.0, position, 0.5)
+}
+
+fn ground(world: &mut World) {
+    let shape = Shape::HalfSpace { normal: DVec3::Y };
+    world.add_static(StaticDesc { shape, position: DVec3::ZERO, rotation: DQuat::IDENTITY, friction: 0.5 }).unwrap();
+}
