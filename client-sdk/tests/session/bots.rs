@@ -28,14 +28,14 @@ fn fleet(server: &FakeServer) -> BotFleet {
     })
 }
 
-/// Sends every slot its snapshots, each car 30 cm further a tick, until it is dropped.
-fn run_world(server: Arc<FakeServer>, slots: u16) -> tokio::task::JoinHandle<()> {
+/// Sends every slot its snapshots, each car `step` m further a tick, until it is aborted.
+pub fn run_world(server: Arc<FakeServer>, slots: u16, step: f32) -> tokio::task::JoinHandle<()> {
     tokio::spawn(async move {
         let mut ticks = tokio::time::interval(Duration::from_millis(33));
         for tick in 101u64.. {
             ticks.tick().await;
             for slot in SLOT..SLOT + slots {
-                let dof = fake_server::car(10 * u32::from(slot), (tick - 100) as f32 * 0.3);
+                let dof = fake_server::car(10 * u32::from(slot), (tick - 100) as f32 * step);
                 let ack = InputAck { sequence: (tick - 101) as u32, tick };
                 let snapshot = Snapshot { tick, ack, event_sequence: EVENTS_BEFORE, dof };
                 let key = format!("pita/{}/snapshot/{slot}", fake_server::ARENA);
@@ -48,7 +48,7 @@ fn run_world(server: Arc<FakeServer>, slots: u16) -> tokio::task::JoinHandle<()>
 #[tokio::test(flavor = "multi_thread")]
 async fn a_fleet_drives_and_counts() {
     let server = Arc::new(FakeServer::start().await);
-    let world = run_world(Arc::clone(&server), 3);
+    let world = run_world(Arc::clone(&server), 3, 0.3);
     let mut fleet = fleet(&server);
     soon("joining", fleet.add(2)).await.unwrap();
     soon("joining", fleet.add(1)).await.unwrap();
