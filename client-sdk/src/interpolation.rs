@@ -27,6 +27,13 @@ impl Default for InterpolationSettings {
     }
 }
 
+impl InterpolationSettings {
+    /// [`Self::frames_max`] in its range.
+    pub(crate) fn frames_max(&self) -> usize {
+        self.frames_max.clamp(2, 256)
+    }
+}
+
 /// The slices after one tick, in order of id.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
@@ -50,7 +57,7 @@ impl InterpolationBuffer {
     pub fn new(settings: InterpolationSettings, period_s: f64) -> Self {
         Self {
             frames: VecDeque::new(),
-            frames_max: settings.frames_max.clamp(2, 256),
+            frames_max: settings.frames_max(),
             extrapolation_max_ticks: settings.extrapolation_max.as_secs_f64() / period_s,
             period_s,
         }

@@ -13,7 +13,7 @@ use pita_protocol::{
 use tokio::sync::mpsc;
 
 use crate::{
-    error::SessionEnd, events::SessionEvent, lock::lock, roster::Reconciled, session::Shared, transport, wire::Wire,
+    error::SessionEnd, events::SessionEvent, lock::lock, roster::Reconciled, shared::Shared, transport, wire::Wire,
 };
 
 /// Events between Zenoh's thread and the keeper. One that finds no room is a gap, like any other loss.
@@ -83,23 +83,22 @@ impl Keeper {
             return;
         };
         drop(inbox);
-        if message.sequence > self.joined_at {
-            self.notice_end(&message.event);
-        }
+        // Apart from the roster: a description that overtook this event does not tell of an end.
+        let end = (message.sequence > self.joined_at).then(|| self.end_by(&message.event)).flatten();
         if self.shared.with_roster(|roster| roster.apply(&message)) {
             lock(&self.shared.inbox).count_event();
             self.shared.events.push(SessionEvent::Happened(message.event));
         }
+        if let Some(end) = end {
+            self.shared.finish(end);
+        }
     }
 
-    /// Apart from the roster, because a description that overtook the event does not tell of it.
-    fn notice_end(&self, event: &Event) {
+    fn end_by(&self, event: &Event) -> Option<SessionEnd> {
         match event {
-            Event::Closing { reason } => self.shared.finish(SessionEnd::Closed { reason: reason.clone() }),
-            Event::Left { slot, reason } if *slot == self.slot => {
-                self.shared.finish(SessionEnd::Removed { reason: reason.clone() });
-            }
-            _ => {}
+            Event::Closing { reason } => Some(SessionEnd::Closed { reason: reason.clone() }),
+            Event::Left { slot, reason } if *slot == self.slot => Some(SessionEnd::Removed { reason: reason.clone() }),
+            _ => None,
         }
     }
 

@@ -1,7 +1,7 @@
 //! A session: one player or spectator in one arena.
 
 use std::{
-    sync::{Arc, Mutex},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -9,17 +9,17 @@ use pita_protocol::{
     message::{Controls, Description, JoinAccepted},
     slices::Slice,
 };
-use tokio::{sync::watch, task::JoinHandle, time::timeout};
-use zenoh::{liveliness::LivelinessToken, pubsub::Subscriber};
+use tokio::{task::JoinHandle, time::timeout};
 
 use crate::{
     builder::SessionBuilder,
     error::{ClientError, SessionEnd},
-    events::{EventQueue, SessionEvent},
-    inbox::Inbox,
-    interpolation::{Frame, InterpolationBuffer},
+    events::SessionEvent,
+    interpolation::Frame,
+    join::Declared,
     lock::lock,
     roster::Roster,
+    shared::{NewestReceiver, Shared, StatisticsReader},
     snapshot::ReceivedSnapshot,
     statistics::Statistics,
     transport,
@@ -29,79 +29,6 @@ use crate::{
 /// How long [`Session::leave`] waits for the server's word that the session is over. Closing the connection at once
 /// could drop the message that says so.
 const LEAVE_TIMEOUT: Duration = Duration::from_secs(1);
-
-/// A delay and the buffer that is read so far behind the newest state.
-type Interpolation = (Duration, Mutex<InterpolationBuffer>);
-
-/// What Zenoh's threads, the keeper and the owner of a session have in common. Locks are held for short computations
-/// only, never across an await.
-#[derive(Debug)]
-pub struct Shared {
-    pub(crate) inbox: Mutex<Inbox>,
-    pub(crate) events: EventQueue,
-    roster: Mutex<Arc<Roster>>,
-    newest: watch::Sender<Option<Arc<ReceivedSnapshot>>>,
-    end: watch::Sender<Option<SessionEnd>>,
-    interpolation: Option<Interpolation>,
-}
-
-impl Shared {
-    pub(crate) fn new(accepted: &JoinAccepted, recent_max: usize, interpolation: Option<Interpolation>) -> Self {
-        let description = &accepted.description;
-        Self {
-            inbox: Mutex::new(Inbox::new(accepted.tick_hz, description.tick, recent_max, Instant::now())),
-            events: EventQueue::default(),
-            roster: Mutex::new(Arc::new(Roster::new(description))),
-            newest: watch::Sender::new(None),
-            end: watch::Sender::new(None),
-            interpolation,
-        }
-    }
-
-    pub(crate) fn take_snapshot(&self, bytes: &[u8], now: Instant) {
-        let newest = lock(&self.inbox).take_snapshot(bytes, now);
-        if newest.is_some() {
-            self.newest.send_replace(newest);
-        }
-    }
-
-    pub(crate) fn newest(&self) -> Option<Arc<ReceivedSnapshot>> {
-        self.newest.borrow().clone()
-    }
-
-    pub(crate) fn roster(&self) -> Arc<Roster> {
-        Arc::clone(&lock(&self.roster))
-    }
-
-    /// Changes the roster; those who hold an earlier one keep it as it was.
-    pub(crate) fn with_roster<T>(&self, change: impl FnOnce(&mut Roster) -> T) -> T {
-        change(Arc::make_mut(&mut lock(&self.roster)))
-    }
-
-    pub(crate) fn end(&self) -> Option<SessionEnd> {
-        self.end.borrow().clone()
-    }
-
-    /// The first end counts.
-    pub(crate) fn finish(&self, end: SessionEnd) {
-        self.end.send_if_modified(|present| {
-            let first = present.is_none();
-            present.get_or_insert(end);
-            first
-        });
-        self.events.close();
-    }
-}
-
-/// The counts of a session that somebody else owns.
-#[derive(Debug)]
-pub(crate) struct StatisticsReader(Arc<Shared>);
-
-impl StatisticsReader {
-    pub(crate) fn read(&self) -> Statistics {
-        lock(&self.0.inbox).statistics()
-    }
-}
 
 /// The state of the world between two ticks.
 #[derive(Clone, Debug, PartialEq)]
@@ -122,13 +49,10 @@ pub struct Session {
     accepted: JoinAccepted,
     shared: Arc<Shared>,
     wire: Arc<Wire>,
-    next: tokio::sync::Mutex<watch::Receiver<Option<Arc<ReceivedSnapshot>>>>,
+    next: tokio::sync::Mutex<NewestReceiver>,
     keeper: JoinHandle<()>,
     _declared: Declared,
 }
-
-/// What is declared for as long as the session lives.
-pub(crate) type Declared = (Subscriber<()>, Subscriber<()>, LivelinessToken);
 
 impl Session {
     /// Connects to `endpoint` (`tcp/HOST:PORT`) and joins the arena there as a player called `name`.
@@ -152,7 +76,7 @@ impl Session {
         keeper: JoinHandle<()>,
         declared: Declared,
     ) -> Self {
-        let next = tokio::sync::Mutex::new(shared.newest.subscribe());
+        let next = tokio::sync::Mutex::new(shared.watch_newest());
         Self { zenoh, accepted, shared, wire, next, keeper, _declared: declared }
     }
 
@@ -210,11 +134,10 @@ impl Session {
     /// How the session ended, once it has.
     pub async fn next_snapshot(&self) -> Result<Arc<ReceivedSnapshot>, SessionEnd> {
         let mut next = self.next.lock().await;
-        let mut end = self.shared.end.subscribe();
         tokio::select! {
             biased;
-            end = ended(&mut end) => Err(end),
-            snapshot = newer(&mut next) => Ok(snapshot),
+            end = self.shared.ended() => Err(end),
+            snapshot = Shared::newer(&mut next) => Ok(snapshot),
         }
     }
 
@@ -272,8 +195,7 @@ impl Session {
     }
 
     async fn wait_until_left(&self) {
-        let mut end = self.shared.end.subscribe();
-        if timeout(LEAVE_TIMEOUT, ended(&mut end)).await.is_err() {
+        if timeout(LEAVE_TIMEOUT, self.shared.ended()).await.is_err() {
             tracing::debug!("the server did not confirm within {LEAVE_TIMEOUT:?} that slot {} left", self.slot());
         }
     }
@@ -282,25 +204,5 @@ impl Session {
 impl Drop for Session {
     fn drop(&mut self) {
         self.keeper.abort();
-    }
-}
-
-async fn ended(end: &mut watch::Receiver<Option<SessionEnd>>) -> SessionEnd {
-    let told = end.wait_for(Option::is_some).await.ok().and_then(|end| end.clone());
-    match told {
-        Some(end) => end,
-        // The sender lives as long as the session, so this is not reached while anybody waits.
-        None => std::future::pending().await,
-    }
-}
-
-async fn newer(next: &mut watch::Receiver<Option<Arc<ReceivedSnapshot>>>) -> Arc<ReceivedSnapshot> {
-    loop {
-        if next.changed().await.is_err() {
-            return std::future::pending().await;
-        }
-        if let Some(snapshot) = next.borrow_and_update().clone() {
-            return snapshot;
-        }
     }
 }

@@ -15,7 +15,7 @@ use zenoh::{
     qos::{CongestionControl, Priority},
 };
 
-use crate::{error::ClientError, lock::lock, outbox::Outbox, session::Shared};
+use crate::{error::ClientError, lock::lock, outbox::Outbox, shared::Shared};
 
 /// Sends the inputs of one session.
 #[derive(Debug)]

@@ -14,7 +14,7 @@ use super::{
     BotTally, FleetTally, ScriptKind,
     driver::{Driver, Meter},
 };
-use crate::{ClientError, Session, lock::lock, session::StatisticsReader};
+use crate::{ClientError, Session, lock::lock, shared::StatisticsReader};
 
 /// Connections that are opened at the same time. More would not be faster: opening is work for both sides.
 const OPENING_MAX: usize = 8;

@@ -85,7 +85,7 @@ impl FakeServer {
             answer(&zenoh, keys.status(), Box::new(move |_| Some(status.clone()))).await,
         ];
         let (inputs, live) = (AsyncMutex::new(inputs), AsyncMutex::new(live));
-        Self { endpoint, zenoh, description, keys, inputs, live, queryables: queryables }
+        Self { endpoint, zenoh, description, keys, inputs, live, queryables }
     }
 
     /// Lets another arena answer status queries.

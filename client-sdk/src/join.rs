@@ -1,0 +1,145 @@
+//! How a session comes about on an open connection: find the arena, listen for events, join, declare the rest.
+
+use std::{
+    sync::{Arc, Mutex},
+    time::{Duration, Instant},
+};
+
+use pita_protocol::{
+    Keys, keys,
+    message::{JoinAccepted, JoinReply, JoinRequest, Role, Status},
+};
+use tokio::sync::mpsc;
+use zenoh::{liveliness::LivelinessToken, pubsub::Subscriber};
+
+use crate::{
+    builder::SessionBuilder,
+    error::ClientError,
+    interpolation::InterpolationBuffer,
+    keeper::{self, EVENTS_MAX, Incoming, Keeper},
+    session::Session,
+    shared::Shared,
+    transport,
+    wire::Wire,
+};
+
+/// What is declared for as long as a session lives.
+#[derive(Debug)]
+pub struct Declared {
+    _events: Subscriber<()>,
+    _snapshots: Subscriber<()>,
+    _token: LivelinessToken,
+}
+
+/// Joins as `wanted` says.
+pub async fn join(
+    wanted: &SessionBuilder,
+    zenoh: &zenoh::Session,
+    request: JoinRequest,
+) -> Result<Session, ClientError> {
+    let arena = match &wanted.arena {
+        Some(name) => name.clone(),
+        None => find_arena(wanted, zenoh).await?,
+    };
+    let keys = Keys::new(&arena).map_err(ClientError::BadArgument)?;
+
+    // Before the join: no event falls between the description in its answer and the subscription.
+    let (events, incoming) = subscribe_to_events(zenoh, &keys).await?;
+    let accepted = ask_to_join(wanted, zenoh, &keys, request).await?;
+    let shared = Arc::new(share(wanted, &accepted));
+    let declared = Declared {
+        _events: events,
+        _snapshots: subscribe_to_snapshots(zenoh, &keys, &accepted, &shared).await?,
+        _token: declare_alive(zenoh, &keys, &accepted).await?,
+    };
+    let wire = Arc::new(Wire::open(zenoh, &keys, &accepted, Arc::clone(&shared)).await?);
+    let silent_otherwise = wanted.role == Role::Spectator;
+    let keeper = Keeper {
+        zenoh: zenoh.clone(),
+        keys,
+        slot: accepted.slot,
+        joined_at: accepted.description.event_sequence,
+        loss_timeout: wanted.loss_timeout,
+        keep_alive: silent_otherwise.then(|| Duration::from_millis(accepted.input_timeout_ms.into()) / 3),
+        shared: Arc::clone(&shared),
+        wire: Arc::clone(&wire),
+    };
+    let keeper = tokio::spawn(keeper.run(incoming));
+    Ok(Session::new(zenoh.clone(), accepted, shared, wire, keeper, declared))
+}
+
+/// The one arena that answers.
+async fn find_arena(wanted: &SessionBuilder, zenoh: &zenoh::Session) -> Result<String, ClientError> {
+    let running: Vec<Status> = transport::ask_all(zenoh, keys::ANY_STATUS, "status", wanted.connect_timeout).await?;
+    let mut names: Vec<String> = running.into_iter().map(|status| status.arena).collect();
+    names.sort_unstable();
+    names.dedup();
+    match names.len() {
+        0 => Err(no_arena(wanted)),
+        1 => Ok(names.remove(0)),
+        _ => Err(ClientError::SeveralArenas(names)),
+    }
+}
+
+async fn ask_to_join(
+    wanted: &SessionBuilder,
+    zenoh: &zenoh::Session,
+    keys: &Keys,
+    request: JoinRequest,
+) -> Result<JoinAccepted, ClientError> {
+    let payload = pita_protocol::encode(&request);
+    match transport::ask(zenoh, &keys.join(), "join", payload, wanted.connect_timeout).await? {
+        Some(JoinReply::Accepted(accepted)) => Ok(*accepted),
+        Some(JoinReply::Refused(refusal)) => Err(refusal.into()),
+        None => Err(no_arena(wanted)),
+    }
+}
+
+fn no_arena(wanted: &SessionBuilder) -> ClientError {
+    let (endpoint, arena) = (wanted.endpoint.clone(), wanted.arena.clone());
+    ClientError::NoArena { endpoint, arena, waited: wanted.connect_timeout }
+}
+
+fn share(wanted: &SessionBuilder, accepted: &JoinAccepted) -> Shared {
+    let period_s = 1.0 / f64::from(accepted.tick_hz);
+    let interpolation =
+        wanted.interpolation.map(|settings| (settings.delay, Mutex::new(InterpolationBuffer::new(settings, period_s))));
+    let recent_max = wanted.interpolation.map_or(0, |settings| settings.frames_max());
+    Shared::new(accepted, recent_max, interpolation)
+}
+
+async fn subscribe_to_events(zenoh: &zenoh::Session, keys: &Keys) -> Result<(Subscriber<()>, Incoming), ClientError> {
+    let (sender, incoming) = mpsc::channel(EVENTS_MAX);
+    let subscriber = zenoh
+        .declare_subscriber(keys.event())
+        .callback(move |sample| keeper::forward(&sample.payload().to_bytes(), &sender))
+        .await
+        .map_err(ClientError::transport("subscribe to events"))?;
+    Ok((subscriber, Incoming(incoming)))
+}
+
+async fn subscribe_to_snapshots(
+    zenoh: &zenoh::Session,
+    keys: &Keys,
+    accepted: &JoinAccepted,
+    shared: &Arc<Shared>,
+) -> Result<Subscriber<()>, ClientError> {
+    let shared = Arc::clone(shared);
+    zenoh
+        .declare_subscriber(keys.snapshot(accepted.slot))
+        .callback(move |sample| shared.take_snapshot(&sample.payload().to_bytes(), Instant::now()))
+        .await
+        .map_err(ClientError::transport("subscribe to snapshots"))
+}
+
+async fn declare_alive(
+    zenoh: &zenoh::Session,
+    keys: &Keys,
+    accepted: &JoinAccepted,
+) -> Result<LivelinessToken, ClientError> {
+    zenoh
+        .liveliness()
+        .declare_token(keys.live(accepted.slot, accepted.epoch))
+        .await
+        .map_err(ClientError::transport("declare the session alive"))
+}

@@ -1,0 +1,120 @@
+//! What Zenoh's threads, the keeper and the owner of a session have in common.
+
+use std::{
+    sync::{Arc, Mutex},
+    time::{Duration, Instant},
+};
+
+use pita_protocol::message::JoinAccepted;
+use tokio::sync::watch;
+
+use crate::{
+    error::SessionEnd, events::EventQueue, inbox::Inbox, interpolation::InterpolationBuffer, lock::lock,
+    roster::Roster, snapshot::ReceivedSnapshot, statistics::Statistics,
+};
+
+/// A delay and the buffer that is read so far behind the newest state.
+type Interpolation = (Duration, Mutex<InterpolationBuffer>);
+
+/// Sees the newest snapshot change.
+pub type NewestReceiver = watch::Receiver<Option<Arc<ReceivedSnapshot>>>;
+
+/// What Zenoh's threads, the keeper and the owner of a session have in common. Locks are held for short computations
+/// only, never across an await.
+#[derive(Debug)]
+pub struct Shared {
+    pub inbox: Mutex<Inbox>,
+    pub events: EventQueue,
+    roster: Mutex<Arc<Roster>>,
+    newest: watch::Sender<Option<Arc<ReceivedSnapshot>>>,
+    end: watch::Sender<Option<SessionEnd>>,
+    pub interpolation: Option<Interpolation>,
+}
+
+impl Shared {
+    pub fn new(accepted: &JoinAccepted, recent_max: usize, interpolation: Option<Interpolation>) -> Self {
+        let description = &accepted.description;
+        Self {
+            inbox: Mutex::new(Inbox::new(accepted.tick_hz, description.tick, recent_max, Instant::now())),
+            events: EventQueue::default(),
+            roster: Mutex::new(Arc::new(Roster::new(description))),
+            newest: watch::Sender::new(None),
+            end: watch::Sender::new(None),
+            interpolation,
+        }
+    }
+
+    pub fn take_snapshot(&self, bytes: &[u8], now: Instant) {
+        let Some(snapshot) = lock(&self.inbox).take_snapshot(bytes, now) else { return };
+        self.newest.send_if_modified(|newest| {
+            // Another thread of Zenoh may have come in between with a newer one.
+            let is_newer = newest.as_ref().is_none_or(|newest| newest.tick() < snapshot.tick());
+            if is_newer {
+                *newest = Some(snapshot);
+            }
+            is_newer
+        });
+    }
+
+    pub fn newest(&self) -> Option<Arc<ReceivedSnapshot>> {
+        self.newest.borrow().clone()
+    }
+
+    /// Waits, on the receiver's behalf, for a snapshot that it has not seen.
+    pub async fn newer(next: &mut NewestReceiver) -> Arc<ReceivedSnapshot> {
+        while next.changed().await.is_ok() {
+            if let Some(snapshot) = next.borrow_and_update().clone() {
+                return snapshot;
+            }
+        }
+        // The sender lives as long as the session, so this is not reached while anybody waits.
+        std::future::pending().await
+    }
+
+    pub fn watch_newest(&self) -> NewestReceiver {
+        self.newest.subscribe()
+    }
+
+    pub fn roster(&self) -> Arc<Roster> {
+        Arc::clone(&lock(&self.roster))
+    }
+
+    /// Changes the roster; those who hold an earlier one keep it as it was.
+    pub fn with_roster<T>(&self, change: impl FnOnce(&mut Roster) -> T) -> T {
+        change(Arc::make_mut(&mut lock(&self.roster)))
+    }
+
+    pub fn end(&self) -> Option<SessionEnd> {
+        self.end.borrow().clone()
+    }
+
+    /// Waits for the session's end.
+    pub async fn ended(&self) -> SessionEnd {
+        let told = self.end.subscribe().wait_for(Option::is_some).await.ok().and_then(|end| end.clone());
+        match told {
+            Some(end) => end,
+            // As above: the sender is ours.
+            None => std::future::pending().await,
+        }
+    }
+
+    /// Ends the session. The first end counts, and no event comes after it.
+    pub fn finish(&self, end: SessionEnd) {
+        self.end.send_if_modified(|present| {
+            let first = present.is_none();
+            present.get_or_insert(end);
+            first
+        });
+        self.events.close();
+    }
+}
+
+/// The counts of a session that somebody else owns.
+#[derive(Debug)]
+pub struct StatisticsReader(pub Arc<Shared>);
+
+impl StatisticsReader {
+    pub fn read(&self) -> Statistics {
+        lock(&self.0.inbox).statistics()
+    }
+}
