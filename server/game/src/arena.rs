@@ -13,6 +13,7 @@ use pita_sim::{Shape, World};
 
 use crate::Controls;
 use crate::actor::{Actor, ActorInfo, Step};
+use crate::arena_file::BoundsFile;
 use crate::pipeline::Ports;
 use crate::spawn::{self, Pose};
 use crate::vehicle::VehicleParameters;
@@ -96,8 +97,8 @@ pub struct Arena {
     ticks: u64,
     world: World,
     statics: Vec<StaticInfo>,
-    /// What falls below is put back, m.
-    floor: f64,
+    /// What leaves it is put back.
+    bounds: BoundsFile,
     vehicle: VehicleParameters,
     /// Never empty.
     spawns: Vec<Pose>,
@@ -197,12 +198,12 @@ impl Arena {
         self.ticks += 1;
     }
 
-    /// Whether an actor fell out of the world, or the engine took one of its bodies out of it.
+    /// Whether an actor left the world, or the engine took one of its bodies out of it.
     fn is_lost(&self, id: u32) -> bool {
         let bodies = self.actors.get(&id).map(|actor| actor.bodies()).unwrap_or_default();
         bodies.iter().any(|&body| {
-            let fell = self.world.position(body).is_none_or(|at| at.y < self.floor);
-            fell || self.world.is_quarantined(body)
+            let inside = self.world.position(body).is_some_and(|at| self.bounds.contains(at));
+            !inside || self.world.is_quarantined(body)
         })
     }
 

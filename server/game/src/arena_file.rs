@@ -14,7 +14,7 @@ use pita_sim::SimError;
 
 pub use key::Key;
 pub use shape::{Angles, Material, ShapeFile};
-pub use tables::{ArenaFile, DriverFile, PropFile, RouteFile, SpawnFile, SpawnGridFile, StaticFile};
+pub use tables::{ArenaFile, BoundsFile, DriverFile, PropFile, RouteFile, SpawnFile, SpawnGridFile, StaticFile};
 
 /// Longest arena file, bytes: a bound on what reading it can cost.
 pub const FILE_MAX: usize = 1 << 20;

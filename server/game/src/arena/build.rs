@@ -32,7 +32,7 @@ impl Arena {
             ticks: 0,
             world,
             statics: Vec::with_capacity(file.statics.len()),
-            floor: file.floor,
+            bounds: file.bounds,
             vehicle: file.vehicle.clone(),
             spawns: spawn_points(&file),
             actors: BTreeMap::new(),

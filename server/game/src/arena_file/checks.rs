@@ -21,7 +21,7 @@ impl ArenaFile {
         check_text(&Key::new("title"), &self.title, 64)?;
         Key::new("max_players").count(self.max_players.into(), 1, 1_024, "players")?;
         Key::new("gravity").number(self.gravity, 0.0, 100.0, "m/s^2")?;
-        Key::new("floor").number(self.floor, -WORLD_MAX, 0.0, "m")?;
+        self.check_bounds()?;
         for (name, material) in &self.materials {
             material.check(&Key::new("materials").at(name))?;
         }
@@ -30,6 +30,22 @@ impl ArenaFile {
         self.check_spawns()?;
         self.check_props()?;
         self.check_routes()
+    }
+
+    fn check_bounds(&self) -> Result<(), ArenaError> {
+        let key = Key::new("bounds");
+        key.at("min").vector(self.bounds.min, WORLD_MAX)?;
+        for axis in 0..3 {
+            key.at("max").index(axis).number(self.bounds.max[axis], self.bounds.min[axis], WORLD_MAX, "m")?;
+        }
+        Ok(())
+    }
+
+    /// What is put back must not be lost where it is put.
+    fn check_inside(&self, key: &Key, point: [f64; 3]) -> Result<(), ArenaError> {
+        (0..3).try_for_each(|axis| {
+            key.index(axis).number(point[axis], self.bounds.min[axis], self.bounds.max[axis], "m, the bounds")
+        })
     }
 
     fn check_statics(&self) -> Result<(), ArenaError> {
@@ -48,17 +64,22 @@ impl ArenaFile {
     fn check_spawns(&self) -> Result<(), ArenaError> {
         for (i, spawn) in self.spawns.iter().enumerate() {
             let key = Key::new("spawns").index(i);
-            key.at("position").vector(spawn.position, WORLD_MAX)?;
+            self.check_inside(&key.at("position"), spawn.position)?;
             key.at("yaw").number(spawn.yaw, -360.0, 360.0, "deg")?;
         }
         let mut points = self.spawns.len();
         for (i, grid) in self.spawn_grids.iter().enumerate() {
             let key = Key::new("spawn_grids").index(i);
-            key.at("center").vector(grid.center, WORLD_MAX)?;
+            self.check_inside(&key.at("center"), grid.center)?;
             key.at("yaw").number(grid.yaw, -360.0, 360.0, "deg")?;
             for axis in 0..2 {
                 key.at("count").index(axis).count(grid.count[axis], 1, THINGS_MAX, "points")?;
                 key.at("spacing").index(axis).number(grid.spacing[axis], 0.0, 1_000.0, "m")?;
+            }
+            for sign in [-0.5, 0.5] {
+                let half = |axis: usize| sign * (grid.count[axis] - 1) as f64 * grid.spacing[axis];
+                let [x, y, z] = grid.center;
+                self.check_inside(&key.at("corner"), [x + half(0), y, z + half(1)])?;
             }
             points += grid.count[0] * grid.count[1];
             key.at("count").count(points, 1, THINGS_MAX, "spawn points in all")?;
@@ -75,12 +96,14 @@ impl ArenaFile {
             prop.shape.check(&key.at("shape"))?;
             self.check_material(&key, &prop.material)?;
             key.at("mass").number(prop.mass, 0.01, 1e6, "kg")?;
-            key.at("position").vector(prop.position, WORLD_MAX)?;
+            self.check_inside(&key.at("position"), prop.position)?;
             key.at("yaw").number(prop.yaw, -360.0, 360.0, "deg")?;
             for axis in 0..3 {
                 key.at("copies").index(axis).count(prop.copies[axis], 1, THINGS_MAX, "copies")?;
                 key.at("spacing").index(axis).number(prop.spacing[axis], -1_000.0, 1_000.0, "m")?;
             }
+            let last = [0, 1, 2].map(|axis| prop.position[axis] + (prop.copies[axis] - 1) as f64 * prop.spacing[axis]);
+            self.check_inside(&key.at("last copy"), last)?;
             bodies += prop.copies.iter().product::<usize>();
             key.at("copies").count(bodies, 1, THINGS_MAX, "props in all")?;
         }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec3;
 use serde::Deserialize;
 
 use super::{Angles, Material, ShapeFile};
@@ -20,9 +21,9 @@ pub struct ArenaFile {
     /// Acceleration downwards, m/s².
     #[serde(default = "standard_gravity")]
     pub gravity: f64,
-    /// What falls below this height is put back, m.
-    #[serde(default = "default_floor")]
-    pub floor: f64,
+    /// Box of the world.
+    #[serde(default)]
+    pub bounds: BoundsFile,
     /// Surfaces, by name.
     pub materials: BTreeMap<String, Material>,
     /// Geometry that never moves.
@@ -52,8 +53,27 @@ fn standard_gravity() -> f64 {
     9.81
 }
 
-fn default_floor() -> f64 {
-    -20.0
+/// Box of the world: what leaves it is put back.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoundsFile {
+    /// Least x, y, z, m.
+    pub min: [f64; 3],
+    /// Greatest x, y, z, m.
+    pub max: [f64; 3],
+}
+
+impl Default for BoundsFile {
+    fn default() -> Self {
+        Self { min: [-5_000.0, -20.0, -5_000.0], max: [5_000.0, 1_000.0, 5_000.0] }
+    }
+}
+
+impl BoundsFile {
+    /// Whether `point` is in the box.
+    pub fn contains(&self, point: DVec3) -> bool {
+        point.cmpge(self.min.into()).all() && point.cmple(self.max.into()).all()
+    }
 }
 
 /// A piece of static geometry.

@@ -30,7 +30,12 @@ const BAD: &[(&str, &str, &[&str])] = &[
     ("max_players = 64", "max_players = 1025", &["max_players is 1025", "1 to 1024 players"]),
     ("max_players = 64", "max_players = -1", &["line 5, column 15"]),
     ("max_players = 64", "max_players = 64\ngravity = nan", &["gravity is NaN", "0 to 100 m/s^2"]),
-    ("max_players = 64", "max_players = 64\nfloor = 1.0", &["floor is 1", "-5000 to 0 m"]),
+    ("[materials", "[bounds]\nmin = [0, 0, 0]\nmax = [9, -1, 9]\n[materials", &["bounds.max[1] is -1", "0 to 5000 m"]),
+    (
+        "[materials",
+        "[bounds]\nmin = [-9, 0, -9]\nmax = [9, 9, 9]\n[materials",
+        &["spawn_grids[0].corner[0] is -28", "-9 to 9 m, the bounds"],
+    ),
     ("max_players = 64", "max_playerz = 64", &["line 5, column 1", "unknown field `max_playerz`", "max_players"]),
     ("max_players = 64", "", &["missing field `max_players`"]),
     ("friction = 1.0", "friction = -0.5", &["materials.asphalt.friction is -0.5", "0 to 5"]),
@@ -84,7 +89,7 @@ const BAD_ADDITIONS: &[(&str, &[&str])] = &[
     ("[vehicle]\nwheel_rounding = 0.5", &["vehicle.wheel_rounding is 0.5", "0 to 0.12 m"]),
     ("[vehicle]\nwings = 2", &["unknown field `wings`"]),
     ("[vehicle]\ndrive = \"sails\"", &["unknown variant `sails`", "`rear`"]),
-    ("[[spawns]]\nposition = [0, nan, 0]", &["spawns[0].position[1] is NaN", "-5000 to 5000 m"]),
+    ("[[spawns]]\nposition = [0, nan, 0]", &["spawns[0].position[1] is NaN", "-20 to 1000 m"]),
     (
         "[[props]]\nname = \"x\"\nshape.half_space = {}\nmaterial = \"asphalt\"\nmass = 1\nposition = [0, 0, 0]",
         &["props[0].shape is half_space", "box, ball, capsule or cylinder"],
