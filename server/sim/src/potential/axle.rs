@@ -190,7 +190,6 @@ impl Term for AxleTerm {
         let local = DMat3::from_diagonal(DVec3::new(self.hub_stiffness, along, self.hub_stiffness));
         let arm = wheel.position - chassis.position;
         let mut blocks = PairBlocks::of_points(r * local * r.transpose(), arm, DVec3::ZERO);
-        let axis = wheel.rotation * DVec3::Z;
         let spin = self.spin(at);
         let motors: f64 = self
             .motors(spin)
@@ -198,8 +197,10 @@ impl Term for AxleTerm {
             .filter(|&(gain, error, limit)| gain * error.abs() < limit)
             .map(|(gain, ..)| gain / at.dt)
             .sum();
-        let plane = (DMat3::IDENTITY - outer(axis, axis)) * self.plane_stiffness;
-        blocks.add_rotation(plane + outer(self.spin_axis, self.spin_axis) * motors);
+        // About the axis at the start of the tick: that is what a wheel spins about without leaving its plane.
+        let about = outer(self.spin_axis, self.spin_axis);
+        let plane = (DMat3::IDENTITY - about) * self.plane_stiffness;
+        blocks.add_rotation(plane + about * motors);
         blocks
     }
 }

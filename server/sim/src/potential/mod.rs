@@ -331,6 +331,7 @@ mod tests {
             inverse_inertia: DMat3::from_diagonal(inertia.recip()),
             rotates: true,
             wheel_axis: None,
+            guessed_spin: None,
         }
     }
 
