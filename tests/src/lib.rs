@@ -6,4 +6,5 @@ pub mod bench;
 pub mod loadtest;
 pub mod observer;
 pub mod process;
+pub mod server_process;
 pub mod table;

@@ -1,8 +1,8 @@
 //! Child processes: their output is kept for messages, and none outlives its owner.
 
 use std::fmt::Write as _;
-use std::io::{BufRead, BufReader, Read};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -18,6 +18,7 @@ const EXIT_POLL: Duration = Duration::from_millis(5);
 pub struct Process {
     name: String,
     child: Child,
+    input: Option<ChildStdin>,
     output: Arc<Output>,
 }
 
@@ -45,13 +46,13 @@ pub enum ProcessError {
 }
 
 impl Process {
-    /// Starts `command`, with its standard input closed and both output streams captured.
+    /// Starts `command`, with both output streams captured; its standard input ends with its owner.
     ///
     /// # Errors
     /// [`ProcessError::Start`] where it cannot be started.
-    pub fn start(name: &str, mut command: Command) -> Result<Self, ProcessError> {
+    pub fn start(name: &str, command: &mut Command) -> Result<Self, ProcessError> {
         let error = |source| ProcessError::Start { name: name.to_owned(), source };
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().map_err(error)?;
         let output = Arc::new(Output::default());
         let streams: [Option<Box<dyn Read + Send>>; 2] =
@@ -59,7 +60,7 @@ impl Process {
         for stream in streams.into_iter().flatten() {
             output.read_on_a_thread(stream);
         }
-        Ok(Self { name: name.to_owned(), child, output })
+        Ok(Self { name: name.to_owned(), input: child.stdin.take(), child, output })
     }
 
     /// Its process id.
@@ -76,9 +77,30 @@ impl Process {
         sent.map_err(|error| self.failed(format!("could not be sent {signal:?}: {error}")))
     }
 
+    /// Writes a line to its standard input.
+    ///
+    /// # Errors
+    /// [`ProcessError::Failed`] where it does not read any more.
+    pub fn tell(&mut self, line: &str) -> Result<(), ProcessError> {
+        let told = self.input.as_mut().map_or(Ok(()), |input| writeln!(input, "{line}"));
+        told.map_err(|error| self.failed(format!("could not be told \"{line}\": {error}")))
+    }
+
+    /// Ends its standard input.
+    pub fn end_input(&mut self) {
+        self.input = None;
+    }
+
     /// Everything it printed so far, both streams.
     pub fn output(&self) -> String {
         self.output.text()
+    }
+
+    /// Number of sockets that it holds open; zero once it has ended.
+    pub fn sockets(&self) -> usize {
+        let folder = format!("/proc/{}/fd", self.pid());
+        let targets = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|fd| std::fs::read_link(fd.path()));
+        targets.flatten().filter(|target| target.to_string_lossy().starts_with("socket:")).count()
     }
 
     /// Waits until it has printed a line that contains `part`, and answers that line.
@@ -119,7 +141,17 @@ impl Process {
         }
     }
 
-    fn failed(&self, what: String) -> ProcessError {
+    /// Waits until it ends, which has to be with success.
+    ///
+    /// # Errors
+    /// [`ProcessError::Failed`] where it fails, or `within` passes first.
+    pub fn wait_for_success(&mut self, within: Duration) -> Result<(), ProcessError> {
+        let status = self.wait(within)?;
+        if status.success() { Ok(()) } else { Err(self.failed(format!("failed ({status})"))) }
+    }
+
+    /// An error that says `what` it did or did not do, and what it printed.
+    pub fn failed(&self, what: String) -> ProcessError {
         ProcessError::Failed { name: self.name.clone(), what, output: self.output() }
     }
 }
@@ -205,9 +237,7 @@ mod tests {
     const SOON: Duration = Duration::from_secs(20);
 
     fn shell(script: &str) -> Process {
-        let mut command = Command::new("sh");
-        command.args(["-c", script]);
-        Process::start("shell", command).unwrap()
+        Process::start("shell", Command::new("sh").args(["-c", script])).unwrap()
     }
 
     #[test]
@@ -229,12 +259,33 @@ mod tests {
     }
 
     #[test]
+    fn a_process_can_be_told_things() {
+        let mut process = shell("while read line; do echo heard $line; done; echo over");
+        process.tell("this").unwrap();
+        assert_eq!(process.line_with("heard", SOON).unwrap(), "heard this");
+        process.end_input();
+        process.wait_for_success(SOON).unwrap();
+        assert!(process.output().ends_with("over"));
+        let failed = shell("exit 3").wait_for_success(SOON).unwrap_err();
+        assert!(failed.to_string().contains("exit status: 3"), "{failed}");
+    }
+
+    #[test]
     fn a_flood_of_output_keeps_its_head_and_tail() {
         let mut process = shell("i=0; while [ $i -lt 2000 ]; do echo line $i; i=$((i+1)); done");
         process.wait(SOON).unwrap();
         let text = process.output();
         assert!(text.starts_with("line 0\n") && text.ends_with("line 1999"), "{text}");
         assert!(text.contains("[1600 lines left out]"), "{text}");
+    }
+
+    #[test]
+    fn sockets_are_counted() {
+        let mut process = shell("exec sleep 60");
+        assert_eq!(process.sockets(), 0);
+        process.signal(Signal::KILL).unwrap();
+        process.wait(SOON).unwrap();
+        assert_eq!(process.sockets(), 0);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use pita_protocol::build_info;
 use pita_protocol::message::STAGE_NAMES;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::figures::{FRAME_60_HZ_MS, TICK_30_HZ_MS, TickFigures};
 use crate::table::table;
@@ -30,7 +30,7 @@ pub struct Step {
 }
 
 /// How the bots of one step did.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct BotFigures {
     /// CPU time of the bots' process over wall time, cores.
     pub cpu_cores: f64,
@@ -40,6 +40,8 @@ pub struct BotFigures {
     pub effect_p50_ms: f64,
     /// The same, 99th percentile, ms.
     pub effect_p99_ms: f64,
+    /// Shortest path that a bot's car drove, m.
+    pub distance_min_m: f64,
     /// Snapshots received, all bots together.
     pub snapshots: u64,
     /// Snapshots that never came, all bots together.
@@ -201,6 +203,14 @@ impl Report {
 }
 
 impl Step {
+    /// The step on one line, while the ramp goes on.
+    pub fn line(&self) -> String {
+        let (tick, late) = (&self.ticks.tick, self.bots.late_p99_ms);
+        let (p50, p99, max) = (ms(tick.p50_ms), ms(tick.p99_ms), ms(tick.max_ms));
+        let clients = self.marked_clients();
+        format!("{clients:>4} clients: tick p50 {p50} p99 {p99} max {max} ms; bots late p99 {} ms", ms(late))
+    }
+
     fn marked_clients(&self) -> String {
         format!("{}{}", self.clients, if self.bots_starved { "*" } else { "" })
     }

@@ -1,0 +1,89 @@
+//! Command line of `pita-loadtest`.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+use pita_client::bots::ScriptKind;
+use pita_protocol::build_info::VERSION_AND_COMMIT;
+
+/// Finds out how many clients one server carries: ramps bots through a list and prints what a tick costs at each count.
+#[derive(Parser)]
+#[command(name = "pita-loadtest", version = VERSION_AND_COMMIT, args_conflicts_with_subcommands = true)]
+pub struct Arguments {
+    /// What to measure.
+    #[command(flatten)]
+    pub options: Options,
+    /// The program's other processes.
+    #[command(subcommand)]
+    pub role: Option<Role>,
+}
+
+/// What to measure, and where the results go.
+#[derive(Args)]
+pub struct Options {
+    /// Numbers of clients, in the order in which they are tried, 1 to 1000 each
+    #[arg(long, value_delimiter = ',', default_value = "1,4,8,16,32,64", value_name = "N,..",
+          value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub clients: Vec<u16>,
+
+    /// Ticks to measure at each number of clients, 30 to 1000000
+    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(30..=1_000_000))]
+    pub ticks: u64,
+
+    /// What the bots do
+    #[arg(long, default_value = "wander")]
+    pub script: ScriptKind,
+
+    /// Measure the server that runs at this endpoint instead of starting one
+    #[arg(long, value_name = "ENDPOINT", conflicts_with_all = ["config", "arena", "cores"])]
+    pub connect: Option<String>,
+
+    /// Configuration of the server that is started
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+
+    /// Arena of the server that is started
+    #[arg(long, value_name = "NAME|FILE")]
+    pub arena: Option<String>,
+
+    /// Cores that the server is pinned to [default: the first two that there are]
+    #[arg(long, value_delimiter = ',', value_name = "CORE,..")]
+    pub cores: Vec<usize>,
+
+    /// Folder for the plot, made if missing
+    #[arg(long, default_value = "out/loadtest", value_name = "FOLDER")]
+    pub out: PathBuf,
+
+    /// Write the figures as JSON to this file, `-` for standard output
+    #[arg(long, value_name = "FILE|-")]
+    pub json: Option<PathBuf>,
+}
+
+/// Processes that the load test starts of itself, so that the CPU time of server and bots is told apart.
+#[derive(Subcommand)]
+pub enum Role {
+    /// The server, pinned.
+    #[command(hide = true)]
+    Serve {
+        /// Cores to run on.
+        #[arg(long, value_delimiter = ',')]
+        cores: Vec<usize>,
+        /// Command line of `pita-server`.
+        #[arg(last = true)]
+        arguments: Vec<OsString>,
+    },
+    /// The bots of one step.
+    #[command(hide = true)]
+    Bots {
+        /// Where the server listens.
+        #[arg(long)]
+        connect: String,
+        /// Number of bots.
+        #[arg(long)]
+        count: usize,
+        /// What they do.
+        #[arg(long)]
+        script: ScriptKind,
+    },
+}

@@ -1,0 +1,168 @@
+//! The daemon as a person meets it: start, stop, subcommands, errors.
+
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use pita_client::SessionEvent;
+use pita_game::Arena;
+use pita_protocol::message::Event;
+use pita_tests::process::{Process, Signal};
+use pita_tests::server_process::ServerProcess;
+
+use crate::clients::connect;
+use crate::{SOON, pita_server, start_server};
+
+/// How soon a started daemon answers. The goal is a second; the rest is for machines with other things to do.
+const ALIVE_WITHIN: Duration = Duration::from_secs(3);
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn it_is_alive_within_a_second_of_starting() {
+    let started = Instant::now();
+    let (server, observer) = start_server().await;
+    let status = observer.status().await.unwrap();
+    let alive = started.elapsed();
+    assert!(alive < ALIVE_WITHIN, "{alive:?}");
+    assert_eq!((status.tick_hz, status.clients), (30, 0), "{status:?}");
+    assert!(status.version.contains(env!("CARGO_PKG_VERSION")), "{status:?}");
+    server.stop().unwrap_or_else(|error| panic!("{error}"));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_taken_port_is_said_and_fails() {
+    let (server, _observer) = start_server().await;
+    let Ended { success, said } = run(pita_server().args(["run", "--listen", &server.endpoint]));
+    assert!(!success, "{said}");
+    let port = server.endpoint.rsplit(':').next().unwrap();
+    assert!(said.contains(port) && said.contains("in use"), "{said}");
+    assert!(said.contains("--listen"), "what to do next is missing: {said}");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn signals_end_it_in_order_and_clients_are_told() {
+    for signal in [Signal::TERM, Signal::INT] {
+        let (mut server, _observer) = start_server().await;
+        let session = connect(&server.endpoint, "ann").await;
+        server.process.signal(signal).unwrap();
+        let told = tokio::time::timeout(SOON, async {
+            loop {
+                match session.next_event().await {
+                    Some(SessionEvent::Happened(Event::Closing { reason })) => return Some(reason),
+                    Some(_) => {}
+                    None => return None,
+                }
+            }
+        });
+        let reason = told.await.expect("told in time").expect("told before the session ended");
+        assert!(!reason.is_empty());
+        server.process.wait_for_success(SOON).unwrap_or_else(|error| panic!("{signal:?}: {error}"));
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn status_asks_a_running_server() {
+    let (server, _observer) = start_server().await;
+    let Ended { success, said } = run(pita_server().args(["status", "--connect", &server.endpoint]));
+    assert!(success, "{said}");
+    assert!(said.contains("tick") && said.contains("clients"), "{said}");
+    server.stop().unwrap_or_else(|error| panic!("{error}"));
+}
+
+#[test]
+fn status_of_no_server_fails_and_says_what_to_do() {
+    let endpoint = format!("tcp/127.0.0.1:{}", free_port());
+    let Ended { success, said } = run(pita_server().args(["status", "--connect", &endpoint]));
+    assert!(!success, "{said}");
+    assert!(said.contains(&endpoint) && said.contains("cargo run --release"), "{said}");
+}
+
+#[test]
+fn check_accepts_the_defaults_from_any_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let Ended { success, said } = run(pita_server().arg("check").current_dir(folder.path()));
+    assert!(success, "{}", said);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn it_runs_in_any_folder_and_at_25_hz() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = pita_server();
+    let server = ServerProcess::start(command.args(["run", "--tick-hz", "25"]).current_dir(folder.path()))
+        .unwrap_or_else(|error| panic!("{error}"));
+    let observer = pita_tests::observer::Observer::connect(&server.endpoint).await.unwrap();
+    assert_eq!(observer.status().await.unwrap().tick_hz, 25);
+    server.stop().unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "it left files");
+}
+
+#[test]
+fn a_bad_configuration_is_named_by_check_and_run() {
+    let folder = tempfile::tempdir().unwrap();
+    for (text, words) in [
+        ("[tick]\ntick_hz = 31\n", &["tick_hz", "31", "30 or 25"][..]),
+        ("[sessions]\nplayers_max = 0\n", &["sessions.players_max", "0", "1 to 1024"]),
+        ("[network]\nlisten = 'over there'\n", &["network.listen", "over there", "tcp/"]),
+        ("[tick\n", &["line 1"]),
+    ] {
+        let file = written(folder.path(), "bad.toml", text);
+        for arguments in [vec!["check", &file], vec!["run", "--config", &file]] {
+            assert_named(pita_server().args(arguments), &file, words);
+        }
+    }
+    let missing = folder.path().join("missing.toml").display().to_string();
+    assert_named(pita_server().args(["check", &missing]), &missing, &["No such file"]);
+}
+
+#[test]
+fn a_bad_arena_is_named_by_check_and_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let heavy = Arena::DEFAULT.replacen("gravity = 9.81", "gravity = 981", 1);
+    let file = written(folder.path(), "heavy.toml", &heavy);
+    let words = ["gravity", "981", "0 to 100"];
+    assert_named(pita_server().args(["check", &file]), &file, &words);
+    assert_named(pita_server().args(["run", "--arena", &file]), &file, &words);
+    assert_named(pita_server().args(["run", "--arena", "atlantis"]), "atlantis", &["proving-ground"]);
+}
+
+#[test]
+fn every_binary_prints_version_and_commit() {
+    for binary in
+        [env!("CARGO_BIN_EXE_pita-test-server"), env!("CARGO_BIN_EXE_pita-loadtest"), env!("CARGO_BIN_EXE_pita-bench")]
+    {
+        let Ended { success, said } = run(Command::new(binary).arg("--version"));
+        assert!(success && said.contains(env!("CARGO_PKG_VERSION")) && said.contains('('), "{said}");
+    }
+}
+
+/// How a program ended, and what it printed.
+struct Ended {
+    success: bool,
+    said: String,
+}
+
+/// Runs to the end, within bounds.
+fn run(command: &mut Command) -> Ended {
+    let mut process = Process::start("the program", command).unwrap_or_else(|error| panic!("{error}"));
+    let status = process.wait(SOON).unwrap_or_else(|error| panic!("{error}"));
+    Ended { success: status.success(), said: process.output() }
+}
+
+/// The command has to fail, naming the file, and in it what is wrong.
+fn assert_named(command: &mut Command, file: &str, words: &[&str]) {
+    let ended = run(command);
+    assert!(!ended.success, "{command:?} did not fail: {}", ended.said);
+    for word in words.iter().chain([&file]) {
+        assert!(ended.said.contains(word), "{command:?} does not name {word:?}: {}", ended.said);
+    }
+}
+
+fn written(folder: &Path, name: &str, text: &str) -> String {
+    let file = folder.join(name);
+    std::fs::write(&file, text).unwrap();
+    file.display().to_string()
+}
+
+/// A port on which nobody listens, most likely.
+fn free_port() -> u16 {
+    std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap().local_addr().unwrap().port()
+}

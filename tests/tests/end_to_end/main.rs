@@ -1,0 +1,59 @@
+//! PITA from end to end: real server processes and real clients over loopback.
+//!
+//! Every test has a server of its own on a free port, so that tests and runs never meet. Every wait is for a condition
+//! and bounded.
+
+mod clients;
+mod daemon;
+mod driving;
+mod frozen;
+mod leaving;
+mod refusals;
+
+use std::future::Future;
+use std::process::Command;
+use std::time::Duration;
+
+use pita_tests::observer::Observer;
+use pita_tests::server_process::ServerProcess;
+
+/// How long anything may take that should happen soon; generous, for machines with other things to do.
+const SOON: Duration = Duration::from_secs(20);
+
+/// How often a condition is looked at that nothing announces.
+const POLL: Duration = Duration::from_millis(20);
+
+/// `pita-server` of this build.
+fn pita_server() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_pita-test-server"))
+}
+
+/// A running server and a connection that asks it questions.
+async fn start_server() -> (ServerProcess, Observer) {
+    let server = ServerProcess::start(pita_server().arg("run")).unwrap_or_else(|error| panic!("{error}"));
+    let observer = Observer::connect(&server.endpoint).await.unwrap_or_else(|error| panic!("{error}"));
+    (server, observer)
+}
+
+/// Waits until `check` answers something.
+async fn eventually<T, F: Future<Output = Option<T>>>(what: &str, mut check: impl FnMut() -> F) -> T {
+    let waited = tokio::time::timeout(SOON, async {
+        loop {
+            if let Some(found) = check().await {
+                return found;
+            }
+            tokio::time::sleep(POLL).await;
+        }
+    });
+    waited.await.unwrap_or_else(|_| panic!("waited {SOON:?} in vain: {what}"))
+}
+
+/// Waits until the server has so many sessions.
+async fn await_clients(observer: &Observer, clients: u32) {
+    let what = format!("{clients} clients");
+    eventually(&what, async || {
+        let status = observer.status().await.unwrap_or_else(|error| panic!("{error}"));
+        (status.clients == clients).then_some(())
+    })
+    .await;
+}
