@@ -144,9 +144,10 @@ impl World {
     ) -> BodyId {
         let (slice, serial) = (self.state.allocate(size.0, size.1), self.serials);
         self.serials += 1;
-        let (force, torque, index) = (DVec3::ZERO, DVec3::ZERO, ABSENT);
+        let (force, torque, impulse, index) = (DVec3::ZERO, DVec3::ZERO, Twist::REST, ABSENT);
         let (is_wheel, quarantined) = (false, false);
-        let body = Body { kind, slice, serial, mass, inertia, collider, force, torque, index, is_wheel, quarantined };
+        let body =
+            Body { kind, slice, serial, mass, inertia, collider, force, torque, impulse, index, is_wheel, quarantined };
         let id = self.bodies.insert(body);
         self.order.push(id);
         id

@@ -81,6 +81,8 @@ pub(crate) struct Body {
     /// Force and torque about the centre of mass asked for by code, for the coming tick, N and N m.
     pub force: DVec3,
     pub torque: DVec3,
+    /// What potentials did to its twist in the last tick.
+    pub impulse: Twist,
     /// Its index among the bodies that take part in this tick; [`ABSENT`] where it does not.
     pub index: u32,
     /// An axle carries it: it spins about its own z axis, and what turns that axis is the axle.
@@ -146,6 +148,8 @@ pub(crate) struct Node {
     pub target: Twist,
     /// Twist at the start of the tick.
     pub before: Twist,
+    /// What potentials did to the twist in the last tick.
+    pub impulse: Twist,
     pub mass: f64,
     /// World inertia at `free_rotation`, kg m²; identity where the body does not rotate.
     pub inertia: DMat3,
@@ -162,6 +166,12 @@ impl Node {
     /// A guess of the twist at the end of the tick, corrected by what is known better.
     pub fn start_from(&self, guess: Twist) -> Twist {
         Twist { angular: self.guessed_spin.unwrap_or(guess.angular), ..guess }
+    }
+
+    /// The twist at the end of the tick if potentials do what they did in the last one.
+    pub fn repeated(&self) -> Twist {
+        let linear = self.target.linear + self.impulse.linear;
+        Twist { linear, angular: self.target.angular + self.impulse.angular }
     }
 
     /// Pose after a tick of `dt` with twist `u`.

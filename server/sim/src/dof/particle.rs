@@ -24,6 +24,7 @@ pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: DVec3) -
         free_spin: DVec3::ZERO,
         target: Twist { linear: linear + dt * (gravity + body.force / body.mass), angular: DVec3::ZERO },
         before: Twist { linear, angular: DVec3::ZERO },
+        impulse: body.impulse,
         mass: body.mass,
         inertia: DMat3::IDENTITY,
         inverse_inertia: DMat3::IDENTITY,

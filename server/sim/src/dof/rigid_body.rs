@@ -47,6 +47,7 @@ pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: DVec3) -
         free_spin,
         target,
         before,
+        impulse: body.impulse,
         mass,
         inertia,
         inverse_inertia,

@@ -57,11 +57,16 @@ impl<const D: usize> Newton<D> {
 
     /// Starts at the cheapest of: the motion without potentials, last tick's motion, rest. Answers the evaluations.
     fn guess(&mut self, problem: &mut Problem) -> usize {
-        const CANDIDATES: [fn(&Node) -> Twist; 3] = [|node| node.target, |node| node.before, |_| Twist::REST];
+        const CANDIDATES: [fn(&Node) -> Twist; 4] = [
+            |node| node.start_from(node.target),
+            |node| node.start_from(node.before),
+            |node| node.start_from(Twist::REST),
+            Node::repeated,
+        ];
         let mut least = f64::NAN;
         for (i, twist) in CANDIDATES.into_iter().enumerate() {
             self.start.clear();
-            self.start.extend(problem.nodes.iter().map(|node| entry_of::<D>(node.start_from(twist(node)))));
+            self.start.extend(problem.nodes.iter().map(|node| entry_of::<D>(twist(node))));
             problem.move_to(&self.start);
             let energy = problem.evaluate(&mut self.residual);
             if i == 0 || energy < least {

@@ -8,7 +8,7 @@ use super::StepReport;
 use super::newton::{Newton, NewtonInfo};
 use super::problem::Problem;
 use crate::collide::{ContactPoint, Partner};
-use crate::dof::{ABSENT, Body, BodyId, Node};
+use crate::dof::{ABSENT, Body, BodyId, Node, Twist};
 use crate::island::{Islands, Place};
 use crate::potential::axle::AxleTerm;
 use crate::potential::ball_joint::BallJointTerm;
@@ -197,10 +197,13 @@ impl Integrator {
             let body = &mut scene.bodies[id];
             let before = body.pose(scene.state);
             body.advance(node, twist, scene.settings.dt, scene.state);
+            body.impulse =
+                Twist { linear: twist.linear - node.target.linear, angular: twist.angular - node.target.angular };
             if !body.is_finite(scene.state) {
                 body.quarantined = true;
                 body.set_pose(before, scene.state);
-                body.set_twist(crate::dof::Twist::REST, scene.state);
+                body.set_twist(Twist::REST, scene.state);
+                body.impulse = Twist::REST;
                 report.quarantined += 1;
             }
             report.bodies += 1;
@@ -272,8 +275,8 @@ fn pose(nodes: &[Node], node: NodeIndex) -> crate::dof::Pose {
     if node == FIXED { crate::dof::Pose::IDENTITY } else { nodes[node as usize].start }
 }
 
-fn before(nodes: &[Node], node: NodeIndex) -> crate::dof::Twist {
-    nodes.get(node as usize).map_or(crate::dof::Twist::REST, |node| node.before)
+fn before(nodes: &[Node], node: NodeIndex) -> Twist {
+    nodes.get(node as usize).map_or(Twist::REST, |node| node.before)
 }
 
 /// From a body's centre of mass to a point; none for what does not turn.

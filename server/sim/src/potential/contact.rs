@@ -16,6 +16,10 @@ const SATURATION: f64 = 1.5;
 /// Most that an impact stiffens a contact, in reduced masses per dt²: 1000 m/s at 30 Hz.
 const STIFFEST: f64 = 4e4;
 
+/// Share of the tangent in friction's stiffness along the slip, the rest is secant. Newton iterations a tick at 0.5, 0.8
+/// and 1: slope55 2.8, 1.9, 1.1; 16 cars 56, 54, 51; pile100 10.2, 7.1, 7.4; 100 sheep 261, 257, 268.
+const TANGENT_SHARE: f64 = 0.8;
+
 /// A contact point in an island.
 #[derive(Clone, Debug)]
 pub(crate) struct ContactTerm {
@@ -155,9 +159,9 @@ impl Term for ContactTerm {
             let tangent = DMat3::IDENTITY - nn;
             k += tangent * (self.tangent_stiffness * secant);
             if length > 0.0 {
-                // Half secant, half tangent along the slip: the tangent alone vanishes where it slides.
+                // The tangent alone vanishes where it slides, and Newton then jumps to and fro across the anchor.
                 let direction = slip / length;
-                k += outer(direction, direction) * (self.tangent_stiffness * (slope - secant) / 2.0);
+                k += outer(direction, direction) * (self.tangent_stiffness * (slope - secant) * TANGENT_SHARE);
             }
         }
         PairBlocks::of_points(k, self.arms[0], self.arms[1])

@@ -326,6 +326,7 @@ mod tests {
             free_spin: DVec3::ZERO,
             target: Twist::REST,
             before: Twist::REST,
+            impulse: Twist::REST,
             mass,
             inertia: DMat3::from_diagonal(inertia),
             inverse_inertia: DMat3::from_diagonal(inertia.recip()),
