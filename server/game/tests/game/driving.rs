@@ -1,4 +1,4 @@
-//! Handling of the default car on flat ground and over a ramp, one step a tick at 30 Hz.
+//! The default car drives, turns, stops, climbs and gets up again: one step a tick at 30 Hz.
 
 use pita_game::Controls;
 use pita_game::vehicle::VehicleParameters;
@@ -55,7 +55,9 @@ fn full_lock_at_walking_pace_turns_as_the_wheels_point() {
     for (steer, sign) in [(-1.0, 1.0), (1.0, -1.0)] {
         let mut track = TestTrack::with_parked_car();
         track.run_until(5.0, Controls { steer, throttle: 0.3, ..Controls::default() }, |t| t.speed() > 2.5);
-        let (radius, yaw_rate) = turn(&mut track, Controls { steer, throttle: 0.08, ..Controls::default() });
+        let creep = Controls { steer, throttle: 0.08, ..Controls::default() };
+        track.run(2.0, creep);
+        let (radius, yaw_rate) = track.turn(creep);
         assert!(yaw_rate * sign > 0.0, "steer {steer} turns by {yaw_rate} rad/s");
         assert!((radius / expected - 1.0).abs() < 0.1, "steer {steer}: radius {radius} m, expected {expected} m");
     }
@@ -66,7 +68,9 @@ fn steering_at_speed_turns_without_spinning_or_rolling_over() {
     for (steer, sign) in [(-1.0, 1.0), (1.0, -1.0)] {
         let mut track = TestTrack::with_parked_car();
         track.run_until(8.0, FULL_THROTTLE, |t| t.speed() > 20.0);
-        let (_, yaw_rate) = turn(&mut track, Controls { steer, throttle: 0.3, ..Controls::default() });
+        let corner = Controls { steer, throttle: 0.3, ..Controls::default() };
+        track.run(2.0, corner);
+        let (_, yaw_rate) = track.turn(corner);
         let car = track.car(0);
         assert!(yaw_rate * sign > 0.1, "steer {steer} turns by {yaw_rate} rad/s");
         assert!(car.upright() > 0.95, "{}", car.upright());
@@ -127,20 +131,4 @@ fn reset_puts_an_overturned_car_on_its_wheels_where_it_is() {
     track.run(2.0, Controls { reset: true, ..Controls::default() });
     assert!(track.car(0).upright() > 0.99, "{}", track.car(0).upright());
     assert!(track.car(0).position.with_y(0.0).distance(before.with_y(0.0)) < 0.5);
-}
-
-/// Radius of the chassis's path, m, and yaw rate, rad/s, over two seconds after two to settle.
-fn turn(track: &mut TestTrack, controls: Controls) -> (f64, f64) {
-    track.run(2.0, controls);
-    let (mut turned, mut way) = (0.0, 0.0);
-    for _ in 0..2 * 30 {
-        let before = track.car(0);
-        track.drive(0, controls);
-        track.tick();
-        let after = track.car(0);
-        let change = after.yaw() - before.yaw();
-        turned += f64::atan2(change.sin(), change.cos());
-        way += after.position.with_y(0.0).distance(before.position.with_y(0.0));
-    }
-    (way / turned.abs(), turned / 2.0)
 }

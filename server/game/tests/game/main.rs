@@ -2,6 +2,7 @@
 
 mod arena_files;
 mod driving;
+mod handling;
 mod pipeline;
 mod players;
 mod reproducibility;

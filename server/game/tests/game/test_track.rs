@@ -43,17 +43,24 @@ impl Ports for Recorder {
 pub struct TestTrack {
     pub arena: Arena,
     pub ports: Recorder,
+    /// Length of a tick, s.
+    dt: f64,
 }
 
 impl TestTrack {
     pub fn new(text: &str, settings: ArenaSettings) -> Self {
         let arena = Arena::from_toml(text, &settings).unwrap_or_else(|e| panic!("{e}"));
-        Self { arena, ports: Recorder::default() }
+        Self { arena, ports: Recorder::default(), dt: 1.0 / f64::from(settings.tick_hz) }
     }
 
     /// Flat ground with one car in slot 0 that has come to rest.
     pub fn with_parked_car() -> Self {
-        let mut track = Self::new(FLAT, SETTINGS);
+        Self::with_parked_car_at(SETTINGS.tick_hz)
+    }
+
+    /// The same at another tick rate.
+    pub fn with_parked_car_at(tick_hz: u16) -> Self {
+        let mut track = Self::new(FLAT, ArenaSettings { tick_hz, ..SETTINGS });
         track.enter(0);
         track.run(2.0, Controls::default());
         track
@@ -77,7 +84,7 @@ impl TestTrack {
 
     /// Holds `controls` in slot 0 for `seconds`.
     pub fn run(&mut self, seconds: f64, controls: Controls) {
-        for _ in 0..(seconds * f64::from(SETTINGS.tick_hz)).round() as usize {
+        for _ in 0..(seconds / self.dt).round() as usize {
             self.drive(0, controls);
             self.tick();
         }
@@ -85,10 +92,9 @@ impl TestTrack {
 
     /// Ticks with `controls` in slot 0 until `reached`, at most `seconds`; answers how long it took, s.
     pub fn run_until(&mut self, seconds: f64, controls: Controls, reached: impl Fn(&Self) -> bool) -> f64 {
-        let dt = 1.0 / f64::from(SETTINGS.tick_hz);
-        for tick in 0..(seconds / dt).round() as usize {
+        for tick in 0..(seconds / self.dt).round() as usize {
             if reached(self) {
-                return tick as f64 * dt;
+                return tick as f64 * self.dt;
             }
             self.drive(0, controls);
             self.tick();
@@ -107,6 +113,22 @@ impl TestTrack {
     /// Motion of the vehicle in `slot`.
     pub fn car(&self, slot: u16) -> Motion {
         self.part(slot, 0)
+    }
+
+    /// Radius of the chassis's path, m, and yaw rate, rad/s, over two seconds with `controls` in slot 0.
+    pub fn turn(&mut self, controls: Controls) -> (f64, f64) {
+        let ticks = (2.0 / self.dt).round();
+        let (mut turned, mut way) = (0.0, 0.0);
+        for _ in 0..ticks as usize {
+            let before = self.car(0);
+            self.drive(0, controls);
+            self.tick();
+            let after = self.car(0);
+            let change = after.yaw() - before.yaw();
+            turned += f64::atan2(change.sin(), change.cos());
+            way += after.position.with_y(0.0).distance(before.position.with_y(0.0));
+        }
+        (way / turned.abs(), turned / (ticks * self.dt))
     }
 
     /// Speed over ground of the car in slot 0, m/s.
