@@ -86,7 +86,8 @@ pub enum SessionEnd {
         reason: String,
     },
     /// Nothing newer was received for too long.
-    #[error("no snapshot for {silent_for:?}: the server or the connection is gone; connect again when it is back")]
+    #[error("no snapshot for {:.1} s: the server or the connection is gone; connect again when it is back",
+        .silent_for.as_secs_f64())]
     Lost {
         /// Length of the silence.
         silent_for: Duration,

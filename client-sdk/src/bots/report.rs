@@ -1,20 +1,17 @@
 //! What a run of bots comes to: a table for a person, JSON for a machine, and a verdict.
 
-use std::time::Duration;
+use std::{collections::BTreeMap, time::Duration};
 
 use comfy_table::{CellAlignment, Table, presets::UTF8_FULL_CONDENSED};
 use serde_json::{Value, json};
 
 use super::{BotTally, FleetTally};
-use crate::statistics::Durations;
+use crate::{SessionEnd, statistics::Durations};
 
 /// A car that drove less than this has gone nowhere, m.
 const NOWHERE_M: f64 = 5.0;
 /// The length of a run for which [`NOWHERE_M`] holds; for shorter ones it is scaled down.
 const NOWHERE_S: f64 = 10.0;
-/// Most lost bots whose reasons are told one by one.
-const REASONS_MAX: usize = 5;
-
 /// The result of one run.
 #[derive(Clone, Debug)]
 pub struct Report {
@@ -30,14 +27,13 @@ impl Report {
         if total.connected < asked {
             problems.push(format!("{} of {asked} bots did not join", asked - total.connected));
         }
-        problems.extend(total.lost.iter().take(REASONS_MAX).map(|end| format!("a bot was lost: {end}")));
-        if total.lost.len() > REASONS_MAX {
-            problems.push(format!("{} bots were lost in all", total.lost.len()));
-        }
+        let joined = total.connected;
+        problems
+            .extend(reasons(&total.lost).into_iter().map(|(why, bots)| format!("{bots} of {joined} bots lost: {why}")));
         let least_m = least_m(tally.elapsed);
         let nowhere = total.distances_m.iter().filter(|&&distance| distance < least_m).count();
         if nowhere > 0 {
-            problems.push(format!("{nowhere} cars went nowhere: less than {least_m:.1} m"));
+            problems.push(format!("{nowhere} of {joined} cars went nowhere: less than {least_m:.1} m"));
         }
         Self { tally, problems }
     }
@@ -66,7 +62,9 @@ impl Report {
             "in kB/s",
             "out kB/s",
         ]);
-        for (name, tally) in self.rows() {
+        // The sum over one script would say the same twice.
+        let rows = if self.tally.scripts.len() == 1 { 1 } else { usize::MAX };
+        for (name, tally) in self.rows().into_iter().take(rows) {
             table.add_row(cells(name, &tally, self.tally.elapsed));
         }
         table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
@@ -90,6 +88,13 @@ impl Report {
         let scripts = self.tally.scripts.iter().map(|(script, tally)| (script.name(), tally.clone()));
         scripts.chain([("all", self.tally.total())]).collect()
     }
+}
+
+/// How many were lost for which reason.
+fn reasons(lost: &[SessionEnd]) -> BTreeMap<String, usize> {
+    let mut reasons = BTreeMap::new();
+    lost.iter().for_each(|end| *reasons.entry(end.to_string()).or_default() += 1);
+    reasons
 }
 
 fn least_m(elapsed: Duration) -> f64 {
@@ -151,4 +156,55 @@ fn quantile_ms(durations: &Durations, quantile: f64) -> Option<f64> {
 
 fn milliseconds(durations: &Durations, quantile: f64) -> String {
     quantile_ms(durations, quantile).map_or_else(|| "-".to_owned(), |ms| format!("{ms:.1}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bots::ScriptKind;
+    use std::time::Instant;
+
+    fn report(distances_m: &[f64], lost: &[SessionEnd], asked: usize, ran: Duration) -> Report {
+        let mut tally = FleetTally::new(Instant::now() - ran);
+        for &distance in distances_m {
+            let bot = BotTally { connected: 1, distances_m: vec![distance], ..BotTally::default() };
+            tally.add(ScriptKind::Circle, &bot);
+        }
+        tally.add(ScriptKind::Chase, &BotTally { lost: lost.to_vec(), ..BotTally::default() });
+        Report::new(tally, asked)
+    }
+
+    #[test]
+    fn a_good_run_has_no_problems() {
+        let report = report(&[120.0, 5.1], &[], 2, Duration::from_secs(30));
+        assert_eq!(report.problems(), &[] as &[String]);
+        assert_eq!(report.json()["ok"], true);
+        assert_eq!(report.json()["scripts"]["circle"]["distance_min_m"], 5.1);
+        let table = report.table().to_string();
+        assert!(["circle", "chase", "all"].iter().all(|row| table.contains(row)), "{table}");
+    }
+
+    #[test]
+    fn what_went_wrong_is_counted_by_reason() {
+        let closed = SessionEnd::Closed { reason: "maintenance".into() };
+        let silent = SessionEnd::Lost { silent_for: Duration::from_millis(3040) };
+        let lost = [closed.clone(), silent, closed];
+        let problems = report(&[120.0, 4.9], &lost, 5, Duration::from_secs(10)).problems;
+        let expected = [
+            "3 of 5 bots did not join",
+            "1 of 2 bots lost: no snapshot for 3.0 s",
+            "2 of 2 bots lost: the server closed (maintenance)",
+            "1 of 2 cars went nowhere: less than 5.0 m",
+        ];
+        assert_eq!(problems.len(), expected.len(), "{problems:?}");
+        for (problem, expected) in problems.iter().zip(expected) {
+            assert!(problem.starts_with(expected), "{problem}");
+        }
+    }
+
+    #[test]
+    fn a_short_run_has_to_get_less_far() {
+        assert_eq!(least_m(Duration::from_secs(2)), 1.0);
+        assert_eq!(least_m(Duration::from_secs(60)), NOWHERE_M);
+    }
 }

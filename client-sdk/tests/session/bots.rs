@@ -71,10 +71,7 @@ async fn a_fleet_drives_and_counts() {
     assert!(total.lateness_us.len() > 90 && !total.session.latency_us.is_empty());
 
     let stopping = tokio::spawn(fleet.stop());
-    let mut left = 0;
-    while left < 3 {
-        left += u32::from(server.input().await.leave);
-    }
+    server.all_leave(3).await;
     let last = soon("stopping", stopping).await.unwrap();
     assert!(last.total().session.snapshots_received > total.session.snapshots_received);
     world.abort();

@@ -84,7 +84,7 @@ async fn cars_that_stand_still_fail_the_run() {
     let output = finish(start(&server.endpoint, &["--count", "1", "--seconds", "1"])).await;
     world.abort();
     assert_eq!(output.status.code(), Some(1));
-    assert!(said(&output).contains("1 cars went nowhere"), "{}", said(&output));
+    assert!(said(&output).contains("1 of 1 cars went nowhere"), "{}", said(&output));
     assert_eq!(figures(&output)["ok"], false);
 }
 
@@ -98,7 +98,7 @@ async fn a_server_that_closes_fails_the_run_at_once() {
     let output = finish(bots).await;
     world.abort();
     assert_eq!(output.status.code(), Some(1));
-    assert!(said(&output).contains("a bot was lost: the server closed (maintenance)"), "{}", said(&output));
+    assert!(said(&output).contains("1 of 1 bots lost: the server closed (maintenance)"), "{}", said(&output));
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -108,10 +108,7 @@ async fn an_interrupt_lets_the_bots_leave() {
     let bots = start(&server.endpoint, &["--count", "2", "--seconds", "600"]);
     while server.input().await.frames.last().unwrap().sequence < 30 {}
     kill_process(Pid::from_child(&bots), Signal::INT).unwrap();
-    let mut left = 0;
-    while left < 2 {
-        left += u32::from(server.input().await.leave);
-    }
+    server.all_leave(2).await;
     let output = finish(bots).await;
     world.abort();
     assert!(output.status.success(), "{}", said(&output));

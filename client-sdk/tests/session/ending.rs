@@ -73,7 +73,7 @@ async fn leaving_says_good_bye_and_waits_for_the_word() {
     assert!(!leaving.is_finished(), "it waits until the server has heard it");
     server.put_event(EVENTS_BEFORE + 1, Event::Left { slot: SLOT, reason: "left".into() }).await;
     let counts = soon("leaving", leaving).await.unwrap();
-    assert_eq!((counts.snapshots_received, counts.inputs_sent), (1, 1));
+    assert_eq!(counts.snapshots_received, 1);
     assert!(!server.liveliness().await.1);
 }
 

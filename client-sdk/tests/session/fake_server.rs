@@ -1,6 +1,7 @@
 //! A server that does what a test tells it, good or bad.
 
 use std::{
+    collections::HashSet,
     net::TcpListener,
     sync::{
         Arc, Mutex,
@@ -113,8 +114,23 @@ impl FakeServer {
 
     /// The next input, opened as the server would.
     pub async fn input(&self) -> InputPacket {
+        self.input_and_slot().await.1
+    }
+
+    /// Waits until so many sessions have said good-bye.
+    pub async fn all_leave(&self, count: usize) {
+        let mut left = HashSet::new();
+        while left.len() < count {
+            let (slot, packet) = self.input_and_slot().await;
+            if packet.leave {
+                left.insert(slot);
+            }
+        }
+    }
+
+    async fn input_and_slot(&self) -> (u16, InputPacket) {
         let (slot, bytes) = soon("an input", async { self.inputs.lock().await.recv().await }).await.unwrap();
-        open(&bytes, &session_key(), &self.keys.input(slot)).unwrap()
+        (slot, open(&bytes, &session_key(), &self.keys.input(slot)).unwrap())
     }
 
     /// The next change of a liveliness token: its key, and whether it came.
