@@ -144,12 +144,16 @@ impl Mark {
     fn figures(&self, fleet: &BotFleet) -> BotFigures {
         let counted = fleet.tally().since(&self.tally).total();
         let ms = |us: u64| us as f64 / 1000.0;
+        let elapsed_s = self.at.elapsed().as_secs_f64();
+        let rate = |bytes: u64| bytes as f64 / elapsed_s / fleet.len().max(1) as f64;
         BotFigures {
-            cpu_cores: (process_cpu_time() - self.cpu).as_secs_f64() / self.at.elapsed().as_secs_f64(),
+            cpu_cores: (process_cpu_time() - self.cpu).as_secs_f64() / elapsed_s,
             late_p99_ms: ms(counted.lateness_us.value_at_quantile(0.99)),
             effect_p50_ms: ms(counted.session.latency_us.value_at_quantile(0.50)),
             effect_p99_ms: ms(counted.session.latency_us.value_at_quantile(0.99)),
             distance_min_m: counted.distance_min_m(),
+            received_bytes_per_s_per_client: rate(counted.session.received_bytes),
+            sent_bytes_per_s_per_client: rate(counted.session.sent_bytes),
             snapshots: counted.session.snapshots_received,
             missed_snapshots: counted.session.snapshots_missed,
             lost: counted.lost.len(),

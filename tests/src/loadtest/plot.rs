@@ -35,7 +35,7 @@ pub fn draw(steps: &[Step], title: &str, path: &Path) -> Drawn {
         .configure_mesh()
         .x_desc("clients")
         .y_desc("tick time, ms")
-        .x_label_formatter(&|x| format!("{x:.0}"))
+        .x_label_formatter(&|x| if x.fract() == 0.0 { x.to_string() } else { String::new() })
         .y_label_formatter(&|y| format!("{y:.0}"))
         .light_line_style(TRANSPARENT)
         .draw()?;
@@ -57,7 +57,7 @@ pub fn draw(steps: &[Step], title: &str, path: &Path) -> Drawn {
 fn draw_limit(chart: &mut Chart, limit_ms: f64, label: &'static str) -> Drawn {
     let clients_end = chart.x_range().end;
     let above = (clients_end * 0.93, limit_ms + chart.y_range().end * 0.035);
-    chart.draw_series(LineSeries::new([(0.0, limit_ms), (clients_end, limit_ms)], BLACK.mix(0.5)))?;
+    chart.draw_series(LineSeries::new([(0.0, limit_ms), (clients_end, limit_ms)], BLACK.mix(0.7).stroke_width(2)))?;
     chart.draw_series([Text::new(label, above, ("sans-serif", 13))])?;
     Ok(())
 }

@@ -93,14 +93,11 @@ async fn measure(
     progress.finish_and_clear();
 
     let tick_ms = 1000.0 / f64::from(after.tick_hz.max(1));
-    let clients_there = f64::from(after.clients.max(1));
     Ok(Step {
         clients,
         ticks: TickFigures::of(&records, after.tick_hz),
         server_cpu_cores: (after.cpu_s - before.cpu_s) / (after.uptime_s - before.uptime_s).max(f64::MIN_POSITIVE),
         server_memory_bytes: after.memory_bytes,
-        sent_bytes_per_s_per_client: after.sent_bytes_per_s / clients_there,
-        received_bytes_per_s_per_client: after.received_bytes_per_s / clients_there,
         bots: bot_figures,
         bots_starved: bot_figures.late_p99_ms > STARVED_LATENESS_TICKS * tick_ms,
     })

@@ -18,10 +18,6 @@ pub struct Step {
     pub server_cpu_cores: f64,
     /// Resident memory of the server at the step's end, bytes.
     pub server_memory_bytes: u64,
-    /// Payload sent, bytes/s a client.
-    pub sent_bytes_per_s_per_client: f64,
-    /// Payload received, bytes/s a client.
-    pub received_bytes_per_s_per_client: f64,
     /// The bots' side.
     pub bots: BotFigures,
     /// The bots were later than [`STARVED_LATENESS_TICKS`](super::STARVED_LATENESS_TICKS): the step tells little about
@@ -42,6 +38,10 @@ pub struct BotFigures {
     pub effect_p99_ms: f64,
     /// Shortest path that a bot's car drove, m.
     pub distance_min_m: f64,
+    /// Payload from the server, bytes/s a client.
+    pub received_bytes_per_s_per_client: f64,
+    /// Payload to the server, bytes/s a client.
+    pub sent_bytes_per_s_per_client: f64,
     /// Snapshots received, all bots together.
     pub snapshots: u64,
     /// Snapshots that never came, all bots together.
@@ -173,8 +173,8 @@ impl Report {
             "clients",
             "server CPU %",
             "server MiB",
-            "sent kB/s a client",
-            "received kB/s a client",
+            "kB/s to a client",
+            "kB/s from it",
             "bots CPU %",
             "bots late p99 ms",
             "effect p50 / p99 ms",
@@ -189,8 +189,8 @@ impl Report {
                     step.marked_clients(),
                     format!("{:.0}", 100.0 * step.server_cpu_cores),
                     format!("{:.0}", step.server_memory_bytes as f64 / f64::from(1 << 20)),
-                    format!("{:.1}", step.sent_bytes_per_s_per_client / 1000.0),
-                    format!("{:.1}", step.received_bytes_per_s_per_client / 1000.0),
+                    format!("{:.1}", bots.received_bytes_per_s_per_client / 1000.0),
+                    format!("{:.1}", bots.sent_bytes_per_s_per_client / 1000.0),
                     format!("{:.0}", 100.0 * bots.cpu_cores),
                     ms(bots.late_p99_ms),
                     format!("{} / {}", ms(bots.effect_p50_ms), ms(bots.effect_p99_ms)),

@@ -7,10 +7,11 @@ use std::time::{Duration, Instant};
 use pita_client::SessionEvent;
 use pita_game::Arena;
 use pita_protocol::message::Event;
-use pita_tests::process::{Process, Signal};
+use pita_tests::process::Signal;
 use pita_tests::server_process::ServerProcess;
 
 use crate::clients::connect;
+use crate::run::{Ended, free_port, run};
 use crate::{SOON, pita_server, start_server};
 
 /// How soon a started daemon answers. The goal is a second; the rest is for machines with other things to do.
@@ -134,19 +135,6 @@ fn every_binary_prints_version_and_commit() {
     }
 }
 
-/// How a program ended, and what it printed.
-struct Ended {
-    success: bool,
-    said: String,
-}
-
-/// Runs to the end, within bounds.
-fn run(command: &mut Command) -> Ended {
-    let mut process = Process::start("the program", command).unwrap_or_else(|error| panic!("{error}"));
-    let status = process.wait(SOON).unwrap_or_else(|error| panic!("{error}"));
-    Ended { success: status.success(), said: process.output() }
-}
-
 /// The command has to fail, naming the file, and in it what is wrong.
 fn assert_named(command: &mut Command, file: &str, words: &[&str]) {
     let ended = run(command);
@@ -160,9 +148,4 @@ fn written(folder: &Path, name: &str, text: &str) -> String {
     let file = folder.join(name);
     std::fs::write(&file, text).unwrap();
     file.display().to_string()
-}
-
-/// A port on which nobody listens, most likely.
-fn free_port() -> u16 {
-    std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap().local_addr().unwrap().port()
 }

@@ -8,7 +8,9 @@ mod daemon;
 mod driving;
 mod frozen;
 mod leaving;
+mod programs;
 mod refusals;
+mod run;
 
 use std::future::Future;
 use std::process::Command;
@@ -19,6 +21,9 @@ use pita_tests::server_process::ServerProcess;
 
 /// How long anything may take that should happen soon; generous, for machines with other things to do.
 const SOON: Duration = Duration::from_secs(20);
+
+/// How long a program may take that does something of its own.
+const LONG: Duration = Duration::from_secs(60);
 
 /// How often a condition is looked at that nothing announces.
 const POLL: Duration = Duration::from_millis(20);

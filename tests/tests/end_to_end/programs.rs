@@ -1,0 +1,79 @@
+//! The programs of this package, run as a person would.
+
+use std::process::Command;
+
+use serde_json::Value;
+
+use crate::run::{Ended, free_port, run};
+use crate::start_server;
+
+#[test]
+fn a_short_load_test_measures_each_step_and_leaves_its_figures() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("new").join("folder");
+    let json = folder.path().join("figures.json");
+    let mut command = load_test();
+    command.args(["--clients", "1,3", "--ticks", "30"]).arg("--out").arg(&out).arg("--json").arg(&json);
+    let Ended { success, said } = run(&mut command);
+    assert!(success, "{said}");
+    assert!(said.contains("up to 3 clients") || said.contains("first passes"), "{said}");
+    assert!(out.join("tick-time.svg").is_file(), "{said}");
+
+    let figures: Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
+    let steps = figures["steps"].as_array().unwrap();
+    let column = |name: &str| steps.iter().map(|step| step[name].as_u64().unwrap()).collect::<Vec<_>>();
+    assert_eq!(column("clients"), [1, 3]);
+    for step in steps {
+        assert_eq!(step["ticks"]["ticks"], 30, "{step}");
+        for positive in ["/ticks/tick/p50_ms", "/ticks/cpu/p50_ms", "/server_cpu_cores", "/server_memory_bytes"] {
+            assert!(step.pointer(positive).and_then(Value::as_f64).is_some_and(|x| x > 0.0), "{positive}: {step}");
+        }
+        assert!(step["bots"]["snapshots"].as_u64().unwrap() > 0 && step["bots"]["lost"] == 0, "{step}");
+    }
+    let bodies: Vec<_> = steps.iter().map(|step| step["ticks"]["bodies"].as_u64().unwrap()).collect();
+    assert!(bodies[1] > bodies[0], "two more cars have more bodies: {bodies:?}");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_load_test_measures_a_running_server_and_leaves_it_running() {
+    let (server, observer) = start_server().await;
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = load_test();
+    command.args(["--connect", &server.endpoint, "--clients", "2", "--ticks", "30", "--json", "-"]);
+    let Ended { success, said } = run(command.arg("--out").arg(folder.path()));
+    assert!(success && said.contains("\"server_cores\": null"), "{said}");
+    assert_eq!(observer.status().await.unwrap().clients, 0);
+}
+
+#[test]
+fn the_load_test_says_what_it_cannot_do() {
+    let nobody = format!("tcp/127.0.0.1:{}", free_port());
+    for (arguments, words) in [
+        (&["--connect", &nobody][..], &[nobody.as_str(), "cargo run --release"][..]),
+        (&["--clients", "0"], &["--clients", "1..=1000"]),
+        (&["--cores", "5000"], &["--cores", "5000"]),
+        (&["--arena", "atlantis"], &["atlantis", "proving-ground"]),
+    ] {
+        let Ended { success, said } = run(load_test().args(arguments));
+        assert!(!success, "{arguments:?}: {said}");
+        for word in words {
+            assert!(said.contains(word), "{arguments:?} does not name {word:?}: {said}");
+        }
+    }
+}
+
+#[test]
+fn measurements_are_listed_and_a_wrong_name_is_refused() {
+    let Ended { success, said } = run(bench().arg("list"));
+    assert!(success && said.contains("measures"), "{said}");
+    let Ended { success, said } = run(bench().arg("tik"));
+    assert!(!success && said.contains("no measurement is called 'tik'"), "{said}");
+}
+
+fn load_test() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_pita-loadtest"))
+}
+
+fn bench() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_pita-bench"))
+}
