@@ -29,6 +29,8 @@ use crate::{
 /// How long [`Session::leave`] waits for the server's word that the session is over. Closing the connection at once
 /// could drop the message that says so.
 const LEAVE_TIMEOUT: Duration = Duration::from_secs(1);
+/// How often the good-bye is said meanwhile: a server drops a packet that follows the last input too closely.
+const LEAVE_STEP: Duration = Duration::from_millis(100);
 
 /// The state of the world between two ticks.
 #[derive(Clone, Debug, PartialEq)]
@@ -185,19 +187,24 @@ impl Session {
     /// seconds, whatever the server does.
     pub async fn leave(self) -> Statistics {
         if self.end().is_none() {
-            match self.wire.send(Controls::default(), true).await {
-                Ok(_) => self.wait_until_left().await,
-                Err(error) => tracing::debug!("leaving: {error}"),
-            }
+            self.say_good_bye().await;
         }
         transport::close(&self.zenoh).await;
         self.statistics()
     }
 
-    async fn wait_until_left(&self) {
-        if timeout(LEAVE_TIMEOUT, self.shared.ended()).await.is_err() {
-            tracing::debug!("the server did not confirm within {LEAVE_TIMEOUT:?} that slot {} left", self.slot());
+    async fn say_good_bye(&self) {
+        let until = tokio::time::Instant::now() + LEAVE_TIMEOUT;
+        while tokio::time::Instant::now() < until {
+            if let Err(error) = self.wire.send(Controls::default(), true).await {
+                tracing::debug!("leaving: {error}");
+                return;
+            }
+            if timeout(LEAVE_STEP, self.shared.ended()).await.is_ok() {
+                return;
+            }
         }
+        tracing::debug!("the server did not confirm within {LEAVE_TIMEOUT:?} that slot {} left", self.slot());
     }
 }
 
