@@ -19,6 +19,9 @@ const ACCEPT_TIMEOUT_MS: u32 = 2000;
 /// Longest wait for a client that does not read, where a message may not be dropped (replies, declarations), µs. Then
 /// its connection is closed.
 const WAIT_BEFORE_CLOSE_US: u32 = 50_000;
+/// Batches of 64 KiB that wait for one client in the queue of snapshots and events. With Zenoh's 2 a burst is dropped for
+/// healthy clients too; more only makes what a slow client gets older.
+const QUEUE_BATCHES: u32 = 4;
 /// Free ports tried, where one was found and then lost to somebody else.
 const FREE_PORT_ATTEMPTS: usize = 5;
 
@@ -109,6 +112,8 @@ fn configuration(config: &Network, endpoint: &str) -> zenoh::Config {
         ("transport/link/tx/lease", json!(config.lease_ms.get())),
         ("transport/link/tx/keep_alive", json!(4)),
         ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", json!(0)),
+        ("transport/link/tx/queue/congestion_control/drop/max_wait_before_drop_fragments", json!(0)),
+        ("transport/link/tx/queue/size/data_high", json!(QUEUE_BATCHES)),
         ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(WAIT_BEFORE_CLOSE_US)),
         ("transport/link/rx/max_message_size", json!(config.message_bytes_max.get())),
         (

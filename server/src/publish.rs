@@ -50,7 +50,7 @@ impl Publishing {
     pub fn new(shared: Arc<Shared>, session: zenoh::Session, asker: Asker) -> zenoh::Result<Self> {
         let slots = shared.sessions().slots();
         Ok(Self {
-            events: Outlet::declare(&session, shared.keys.event())?,
+            events: Outlet::for_events(&session, shared.keys.event())?,
             ledger: Ledger::new(slots),
             description: shared.description(),
             shared,
@@ -106,7 +106,7 @@ impl Publishing {
     }
 
     fn begin_session(&mut self, id: SessionId, role: Role, name: String) {
-        match Outlet::declare(&self.session, self.shared.keys.snapshot(id.slot)) {
+        match Outlet::for_snapshots(&self.session, self.shared.keys.snapshot(id.slot)) {
             Ok(outlet) => drop(self.outlets.insert(id.slot, (id, outlet))),
             Err(reason) => tracing::error!("no publisher for slot {}: {reason}", id.slot),
         }

@@ -1,4 +1,4 @@
-//! A declared publisher that never waits.
+//! Declared publishers that never wait.
 
 use zenoh::Wait;
 use zenoh::pubsub::Publisher;
@@ -10,16 +10,30 @@ pub struct Outlet {
 }
 
 impl Outlet {
-    /// Declares a publisher on `key`; dropping the outlet takes it back.
+    /// Declares the publisher of a session's snapshots on `key`; dropping the outlet takes it back. A snapshot leaves at
+    /// once, together with the events before it.
     ///
     /// # Errors
     /// What Zenoh says.
-    pub fn declare(session: &zenoh::Session, key: String) -> zenoh::Result<Self> {
+    pub fn for_snapshots(session: &zenoh::Session, key: String) -> zenoh::Result<Self> {
+        Self::declare(session, key, true)
+    }
+
+    /// Declares the publisher of events on `key`. Events of one tick share a batch: each in its own, a dozen of them
+    /// (eight players leave at once) overflow the queues of healthy clients.
+    ///
+    /// # Errors
+    /// What Zenoh says.
+    pub fn for_events(session: &zenoh::Session, key: String) -> zenoh::Result<Self> {
+        Self::declare(session, key, false)
+    }
+
+    fn declare(session: &zenoh::Session, key: String, express: bool) -> zenoh::Result<Self> {
         let publisher = session
             .declare_publisher(key)
             .congestion_control(CongestionControl::Drop)
             .priority(Priority::DataHigh)
-            .express(true)
+            .express(express)
             .wait()?;
         Ok(Self { publisher })
     }
