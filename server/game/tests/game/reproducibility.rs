@@ -17,6 +17,9 @@ fn hashes(cars: u16, seconds: usize, threads: usize) -> Vec<u64> {
                 track.drive(slot, script(slot, second as f64 + tick as f64 / 30.0));
             }
             track.tick();
+            let report = track.arena.world().report();
+            let whole = report.quarantined == 0 && report.worst_joint_gap < 0.03 && report.worst_penetration < 0.3;
+            assert!(whole, "tick {}: {report:?}", track.arena.tick());
         }
         hashes.push(track.arena.world().state_hash());
     }
