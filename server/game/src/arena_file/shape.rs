@@ -40,7 +40,7 @@ pub enum ShapeFile {
         half_length: f64,
         /// Radius, m.
         radius: f64,
-        /// Radius of the edges, contained in the other two, m.
+        /// Radius of the edges, contained in the other two, at most 0.9 of each, m.
         #[serde(default)]
         rounding: f64,
     },
@@ -65,7 +65,7 @@ impl ShapeFile {
             Self::Cylinder { half_length, radius, rounding } => {
                 size("cylinder.half_length", half_length)?;
                 size("cylinder.radius", radius)?;
-                key.at("cylinder.rounding").number(rounding, 0.0, half_length.min(radius), "m")
+                key.at("cylinder.rounding").number(rounding, 0.0, 0.9 * half_length.min(radius), "m")
             }
         }
     }

@@ -185,7 +185,9 @@ impl VehicleParameters {
         number("wheel_mass", self.wheel_mass, 1.0, 2_000.0, "kg")?;
         number("wheel_radius", self.wheel_radius, 0.1, 2.0, "m")?;
         number("wheel_half_width", self.wheel_half_width, 0.02, 1.0, "m")?;
-        number("wheel_rounding", self.wheel_rounding, 0.0, self.wheel_half_width.min(self.wheel_radius), "m")?;
+        // The engine's wheels have some tread between their edges.
+        let rounding_max = 0.9 * self.wheel_half_width.min(self.wheel_radius);
+        number("wheel_rounding", self.wheel_rounding, 0.0, rounding_max, "m")?;
         number("tyre_friction", self.tyre_friction, 0.0, 5.0, "")?;
         number("suspension_stiffness", self.suspension_stiffness, 1e3, 1e7, "N/m")?;
         number("suspension_damping", self.suspension_damping, 0.0, 1e6, "N s/m")?;
@@ -205,7 +207,9 @@ impl VehicleParameters {
         number("brake_torque_rear", self.brake_torque_rear, 0.0, 1e6, "N m")?;
         number("handbrake_torque", self.handbrake_torque, 0.0, 1e6, "N m")?;
         number("pedal_time", self.pedal_time, 0.0, 5.0, "s")?;
-        number("steer_max_deg", self.steer_max_deg, 0.0, 60.0, "deg")?;
+        // Ackermann's inner wheel stays well below a right angle.
+        let steer_max = (1.8 * self.wheelbase / self.track).atan().to_degrees().min(60.0).floor();
+        number("steer_max_deg", self.steer_max_deg, 0.0, steer_max, "deg")?;
         number("steer_rate_deg", self.steer_rate_deg, 1.0, 3_600.0, "deg/s")?;
         number("steer_acceleration", self.steer_acceleration, 0.1, 100.0, "m/s^2")
     }

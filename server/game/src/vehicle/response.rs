@@ -3,6 +3,9 @@
 use super::VehicleParameters;
 use crate::Controls;
 
+/// A throttle that falls below this is released: the engine brakes from here on.
+const RELEASED: f64 = 0.02;
+
 /// Pedals and steering as they are now.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Response {
@@ -43,6 +46,3 @@ impl Response {
         self.steer
     }
 }
-
-/// A throttle that falls below this is released: the engine brakes from here on.
-const RELEASED: f64 = 0.02;

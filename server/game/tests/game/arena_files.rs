@@ -86,7 +86,8 @@ fn assert_refused<'a>(files: impl Iterator<Item = (String, &'a str, &'a [&'a str
 /// Text behind the flat arena's file, and what the error has to say.
 const BAD_ADDITIONS: &[(&str, &[&str])] = &[
     ("[vehicle]\nchassis_mass = 0", &["vehicle.chassis_mass is 0", "50 to 50000 kg"]),
-    ("[vehicle]\nwheel_rounding = 0.5", &["vehicle.wheel_rounding is 0.5", "0 to 0.12 m"]),
+    ("[vehicle]\nwheel_rounding = 0.5", &["vehicle.wheel_rounding is 0.5", "0 to 0.108 m"]),
+    ("[vehicle]\ntrack = 5\nwheelbase = 1", &["vehicle.steer_max_deg is 35", "0 to 19 deg"]),
     ("[vehicle]\nwings = 2", &["unknown field `wings`"]),
     ("[vehicle]\ndrive = \"sails\"", &["unknown variant `sails`", "`rear`"]),
     ("[[spawns]]\nposition = [0, nan, 0]", &["spawns[0].position[1] is NaN", "-20 to 1000 m"]),
