@@ -76,6 +76,11 @@ impl Keys {
         self.of(&format!("snapshot/{slot}"))
     }
 
+    /// All snapshots, for the server's access rules.
+    pub fn all_snapshots(&self) -> String {
+        self.of("snapshot/*")
+    }
+
     /// Put by the server: [`EventMessage`](crate::message::EventMessage).
     pub fn event(&self) -> String {
         self.of("event")

@@ -104,7 +104,7 @@ fn run_arena(config: &ServerConfig, arena: Arena, clock: Clock) -> Result<(), Da
         // Before anything that has to be ended in order.
         let signals = Signals::new()?;
         let shared = Arc::new(share(config, &arena, clock)?);
-        let (session, endpoint) = network::open(&config.network).await?;
+        let (session, endpoint) = network::open(&config.network, &shared.keys).await?;
         let mut serving = Serving::start(config, arena, &shared, session)?;
         report::print(&report::welcome(&endpoint, &metrics::status(&shared)));
         let ended = watch(config, &shared, &mut serving, signals).await;
@@ -151,9 +151,7 @@ async fn watch(
             _ = lines.tick() => {
                 report::print(&report::status_line(&metrics::status(shared)));
                 let now = shared.metrics().totals();
-                if let Some(line) = report::overrun_line(&totals, &now, config.tick.when_behind) {
-                    report::print(&line);
-                }
+                report::trouble(&totals, &now, config.tick.when_behind).iter().for_each(|line| report::print(line));
                 totals = now;
             }
             name = serving.thread_ended() => return Err(DaemonError::ThreadEnded(name)),

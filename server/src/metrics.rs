@@ -141,7 +141,6 @@ pub fn status(shared: &Shared) -> Status {
 mod tests {
     use super::*;
 
-    #[expect(clippy::field_reassign_with_default, reason = "frames have a private part")]
     fn frame(ticks: std::ops::RangeInclusive<u64>, wall_us: impl Fn(u64) -> u32) -> Frame {
         let records = ticks.map(|tick| TickRecord { tick, wall_us: wall_us(tick), ..TickRecord::default() }).collect();
         let mut frame = Frame::default();

@@ -1,10 +1,13 @@
 //! Zenoh: how the daemon's session is configured and opened.
 //!
 //! Owns the choices that keep one client from harming the others: a peer that listens on TCP and neither scouts nor
-//! gossips, puts that are dropped rather than waited for, bounded messages, bounded input rate.
+//! gossips, puts that are dropped rather than waited for, bounded messages, bounded input rate, and access rules: the
+//! peer forwards from client to client, so without them anybody could put snapshots and answer joins in its name.
 
-use std::net::{SocketAddr, TcpListener, ToSocketAddrs};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 
+use pita_protocol::Keys;
+use pita_protocol::keys::{ANY_JOIN, ANY_STATUS};
 use serde_json::json;
 
 use crate::config::Network;
@@ -32,7 +35,7 @@ pub enum NetworkError {
     #[error("network.listen: {0}")]
     Endpoint(String),
     /// The address cannot be had.
-    #[error("cannot listen on {endpoint}: {reason}{}", hint(reason))]
+    #[error("cannot listen on {endpoint}: {reason}{}", hint(endpoint, reason))]
     Bind {
         /// Where.
         endpoint: String,
@@ -49,14 +52,17 @@ pub enum NetworkError {
     },
 }
 
-fn hint(reason: &std::io::Error) -> &'static str {
+fn hint(endpoint: &str, reason: &std::io::Error) -> String {
     match reason.kind() {
-        std::io::ErrorKind::AddrInUse => {
-            "\nIs another server running? `pita-server status` asks it. Or take a free port: --listen tcp/127.0.0.1:0"
+        std::io::ErrorKind::AddrInUse => format!(
+            "\nIs another server running? Ask it: pita-server status --connect {endpoint}\n\
+             Or take a free port: --listen tcp/127.0.0.1:0"
+        ),
+        std::io::ErrorKind::AddrNotAvailable => "\nNo interface of this machine has that address.".to_owned(),
+        std::io::ErrorKind::PermissionDenied => {
+            "\nPorts below 1024 are not for everybody: take a higher one.".to_owned()
         }
-        std::io::ErrorKind::AddrNotAvailable => "\nNo interface of this machine has that address.",
-        std::io::ErrorKind::PermissionDenied => "\nPorts below 1024 are not for everybody: take a higher one.",
-        _ => "",
+        _ => String::new(),
     }
 }
 
@@ -64,12 +70,12 @@ fn hint(reason: &std::io::Error) -> &'static str {
 ///
 /// # Errors
 /// [`NetworkError`], before anything listens.
-pub async fn open(config: &Network) -> Result<(zenoh::Session, String), NetworkError> {
+pub async fn open(config: &Network, keys: &Keys) -> Result<(zenoh::Session, String), NetworkError> {
     let wanted = address(&config.listen).map_err(NetworkError::Endpoint)?;
     let mut attempt = 1;
     loop {
         let endpoint = format!("tcp/{}", free_address(&config.listen, wanted)?);
-        match zenoh::open(configuration(config, &endpoint)).await {
+        match zenoh::open(configuration(config, keys, &endpoint)).await {
             Ok(session) => return Ok((session, endpoint)),
             Err(_) if wanted.port() == 0 && attempt < FREE_PORT_ATTEMPTS => attempt += 1,
             Err(reason) => return Err(NetworkError::Zenoh { endpoint, reason: reason.to_string() }),
@@ -85,10 +91,15 @@ pub fn check_endpoint(endpoint: &str) -> Result<(), String> {
     address(endpoint).map(drop)
 }
 
+/// Names other than `localhost` are not resolved: whether a configuration is valid must not depend on the network.
 fn address(endpoint: &str) -> Result<SocketAddr, String> {
-    let wrong = || format!("{endpoint:?} is no endpoint, allowed is tcp/ADDRESS:PORT, for example tcp/127.0.0.1:7447");
-    let address = endpoint.strip_prefix("tcp/").ok_or_else(wrong)?;
-    address.to_socket_addrs().ok().and_then(|mut found| found.next()).ok_or_else(wrong)
+    let numeric = endpoint.strip_prefix("tcp/").and_then(|address| match address.strip_prefix("localhost:") {
+        Some(port) => Some((Ipv4Addr::LOCALHOST, port.parse().ok()?).into()),
+        None => address.parse().ok(),
+    });
+    numeric.ok_or_else(|| {
+        format!("{endpoint:?} is no endpoint, allowed is tcp/ADDRESS:PORT, for example tcp/127.0.0.1:7447")
+    })
 }
 
 /// Takes and gives back the address, because that says more clearly than Zenoh why it cannot be had, and which port a 0
@@ -98,8 +109,8 @@ fn free_address(endpoint: &str, wanted: SocketAddr) -> Result<SocketAddr, Networ
     bound.map_err(|reason| NetworkError::Bind { endpoint: endpoint.to_owned(), reason })
 }
 
-fn configuration(config: &Network, endpoint: &str) -> zenoh::Config {
-    let inputs = "pita/*/input/**";
+fn configuration(config: &Network, keys: &Keys, endpoint: &str) -> zenoh::Config {
+    let inputs = keys.all_inputs();
     let settings = [
         ("mode", json!("peer")),
         ("listen/endpoints", json!([endpoint])),
@@ -127,6 +138,7 @@ fn configuration(config: &Network, endpoint: &str) -> zenoh::Config {
         ),
     ];
     let mut zenoh = zenoh::Config::default();
+    let settings = settings.into_iter().chain([("access_control", access_rules(keys))]);
     for (key, value) in settings {
         // Keys and types are Zenoh's own and do not depend on input beyond the ranges of `Network`; a test has them all.
         zenoh.insert_json5(key, &value.to_string()).expect("a setting of Zenoh");
@@ -134,14 +146,90 @@ fn configuration(config: &Network, endpoint: &str) -> zenoh::Config {
     zenoh
 }
 
+/// What clients may do: put inputs, ask, listen, show their tokens. Everything else is denied.
+fn access_rules(keys: &Keys) -> serde_json::Value {
+    let questions =
+        [keys.join(), keys.describe(), keys.status(), keys.ticks(), ANY_JOIN.to_owned(), ANY_STATUS.to_owned()];
+    let allow = |id: &str, flow: &str, messages: &[&str], key_exprs: &[String]| {
+        json!({
+            "id": id, "flows": [flow], "permission": "allow", "messages": messages, "key_exprs": key_exprs
+        })
+    };
+    let everything = [
+        "put",
+        "delete",
+        "declare_subscriber",
+        "query",
+        "reply",
+        "declare_queryable",
+        "liveliness_token",
+        "liveliness_query",
+        "declare_liveliness_subscriber",
+    ];
+    json!({
+        "enabled": true,
+        "default_permission": "deny",
+        "rules": [
+            allow("inputs", "ingress", &["put"], &[keys.all_inputs()]),
+            allow("questions", "ingress", &["query"], &questions),
+            allow("listening", "ingress", &["declare_subscriber"], &[keys.all_snapshots(), keys.event()]),
+            allow("tokens", "ingress", &["liveliness_token"], &[keys.all_live()]),
+            allow("server", "egress", &everything, &["**".to_owned()]),
+        ],
+        "subjects": [{ "id": "anybody" }],
+        "policies": [{
+            "rules": ["inputs", "questions", "listening", "tokens", "server"],
+            "subjects": ["anybody"],
+        }],
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::config::ServerConfig;
+    use std::time::Duration;
+    use zenoh::Wait;
 
     #[test]
     fn zenoh_knows_every_setting() {
-        configuration(&ServerConfig::built_in().network, "tcp/127.0.0.1:7447");
+        configuration(&ServerConfig::built_in().network, &Keys::new("a").unwrap(), "tcp/127.0.0.1:7447");
+    }
+
+    /// What arrives first at a client that listens on `key` while another client and then the server put there.
+    async fn first_heard(server: &zenoh::Session, endpoint: &str, key: &str) -> Vec<u8> {
+        let client = || async {
+            let config = crate::status::client_configuration(endpoint).unwrap();
+            zenoh::open(config).await.unwrap()
+        };
+        let (honest, mallory) = (client().await, client().await);
+        let heard = honest.declare_subscriber(key).await.unwrap();
+        // Its answer comes after everything that the client sent before: the server knows of the subscription, or has
+        // seen the put.
+        let ask = async |client: &zenoh::Session| {
+            let reply = client.get("pita/a/status").await.unwrap().recv_async().await.unwrap();
+            assert!(reply.result().is_ok());
+        };
+        ask(&honest).await;
+        mallory.put(key, "mallory").await.unwrap();
+        ask(&mallory).await;
+        server.put(key, "server").await.unwrap();
+        heard.recv_async().await.unwrap().payload().to_bytes().into_owned()
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+    async fn clients_cannot_speak_for_the_server() {
+        let keys = Keys::new("a").unwrap();
+        let config = Network { listen: "tcp/127.0.0.1:0".to_owned(), ..ServerConfig::built_in().network };
+        let (server, endpoint) = open(&config, &keys).await.unwrap();
+        let answer = |query: zenoh::query::Query| drop(query.reply("pita/a/status", "").wait());
+        server.declare_queryable(keys.status()).callback(answer).background().await.unwrap();
+        let all = async {
+            for key in [keys.snapshot(3), keys.event()] {
+                assert_eq!(first_heard(&server, &endpoint, &key).await, b"server", "{key}");
+            }
+        };
+        tokio::time::timeout(Duration::from_secs(20), all).await.expect("in time");
     }
 
     #[test]
@@ -149,7 +237,9 @@ mod tests {
         for good in ["tcp/127.0.0.1:7447", "tcp/[::1]:0", "tcp/localhost:65535"] {
             assert_eq!(check_endpoint(good), Ok(()));
         }
-        for bad in ["", "127.0.0.1:7447", "udp/127.0.0.1:7447", "tcp/127.0.0.1", "tcp/127.0.0.1:70000", "tcp/1.2.3:x"] {
+        for bad in
+            ["", "127.0.0.1:7447", "udp/127.0.0.1:7447", "tcp/127.0.0.1", "tcp/127.0.0.1:70000", "tcp/example.org:1"]
+        {
             assert!(check_endpoint(bad).unwrap_err().contains("tcp/ADDRESS:PORT"), "{bad}");
         }
     }

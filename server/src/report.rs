@@ -61,17 +61,50 @@ pub fn status_line(status: &Status) -> String {
     )
 }
 
-/// What is said about ticks that took too long since `before`; nothing where none did.
-pub fn overrun_line(before: &Totals, now: &Totals, when_behind: WhenBehind) -> Option<String> {
+/// What is said about trouble since `before`, a line each; nothing where there was none.
+pub fn trouble(before: &Totals, now: &Totals, when_behind: WhenBehind) -> Vec<String> {
+    let mut lines = Vec::new();
     let overruns = now.overruns - before.overruns;
-    if overruns == 0 {
-        return None;
-    }
     let lost_ms = (now.given_up_ns - before.given_up_ns) / 1_000_000;
     let skipped = now.skipped_ticks - before.skipped_ticks;
-    let done = match when_behind {
-        WhenBehind::SlowDown => format!("every tick is simulated, the world fell {lost_ms} ms behind the clock"),
-        WhenBehind::Skip => format!("{skipped} ticks left out, the world fell {lost_ms} ms further behind the clock"),
-    };
-    Some(format!("{overruns} ticks took longer than their period: {done}"))
+    if overruns + lost_ms + skipped > 0 {
+        let done = match when_behind {
+            WhenBehind::SlowDown => "every tick is simulated".to_owned(),
+            WhenBehind::Skip => format!("{skipped} ticks were left out"),
+        };
+        lines.push(format!(
+            "behind: {overruns} ticks took longer than their period, {done}, the world fell {lost_ms} ms behind the clock"
+        ));
+    }
+    let unpublished = now.frames_missed - before.frames_missed;
+    if unpublished > 0 {
+        lines.push(format!("behind: {unpublished} ticks were not published, because publishing did not keep up"));
+    }
+    let quarantined = now.quarantined - before.quarantined;
+    if quarantined > 0 {
+        lines.push(format!("quarantined: the state of {quarantined} bodies was not finite and has been frozen"));
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_new_trouble_is_told() {
+        let before = Totals { overruns: 5, given_up_ns: 7_000_000, ..Totals::default() };
+        assert_eq!(trouble(&before, &before, WhenBehind::SlowDown), Vec::<String>::new());
+        let now = Totals { overruns: 7, given_up_ns: 90_000_000, frames_missed: 4, quarantined: 1, ..before };
+        let lines = trouble(&before, &now, WhenBehind::SlowDown);
+        assert_eq!(lines.len(), 3);
+        assert!(lines[0].contains("2 ticks") && lines[0].contains("83 ms"), "{lines:?}");
+        let skipping = trouble(&before, &Totals { skipped_ticks: 3, ..before }, WhenBehind::Skip);
+        assert!(skipping[0].contains("3 ticks were left out"), "{skipping:?}");
+    }
+
+    #[test]
+    fn rates_have_a_unit_that_fits() {
+        assert_eq!([0.0, 999.0, 1500.0, 2.5e6].map(rate), ["0 B/s", "999 B/s", "1.5 kB/s", "2.50 MB/s"]);
+    }
 }

@@ -81,7 +81,8 @@ pub async fn ask(endpoint: &str) -> Result<Status, StatusError> {
     Err(StatusError::NoAnswer { endpoint: endpoint.to_owned() })
 }
 
-fn client_configuration(endpoint: &str) -> zenoh::Result<zenoh::Config> {
+/// A client that knows one server and looks for no other.
+pub(crate) fn client_configuration(endpoint: &str) -> zenoh::Result<zenoh::Config> {
     let mut config = zenoh::Config::default();
     config.insert_json5("mode", "\"client\"")?;
     config.insert_json5("connect/endpoints", &json!([endpoint]).to_string())?;
