@@ -145,6 +145,7 @@ async fn watch(
 ) -> Result<(), DaemonError> {
     let period = Duration::from_secs(config.report.status_line_s.get().into());
     let mut lines = tokio::time::interval_at(tokio::time::Instant::now() + period, period);
+    lines.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     let mut totals = Totals::default();
     loop {
         tokio::select! {
