@@ -8,7 +8,7 @@ use pita_protocol::DEFAULT_ENDPOINT;
 use pita_protocol::build_info::VERSION_AND_COMMIT;
 
 use crate::config::TickRate;
-use crate::{check, daemon, status};
+use crate::{check, daemon, simulate, status};
 
 /// Headless physics game server.
 #[derive(Debug, Parser)]
@@ -26,6 +26,8 @@ enum Command {
     Run(RunArgs),
     /// Check configuration and arena files
     Check(CheckArgs),
+    /// Run a scene or an arena headless, as fast as it goes, without network
+    Simulate(SimulateArgs),
     /// Ask a running server how it does
     Status(StatusArgs),
 }
@@ -57,6 +59,29 @@ pub struct CheckArgs {
     pub json: bool,
 }
 
+/// Arguments of `simulate`.
+#[derive(Debug, Args)]
+pub struct SimulateArgs {
+    /// A .scene file, an arena file, or the name of a built-in arena
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Ticks to run; the scene's own number, or a minute of an arena, where it is not given
+    #[arg(long, value_name = "N")]
+    pub ticks: Option<usize>,
+    /// Write PREFIX.tr (states) and PREFIX.ms (times) for the yardstick's judge
+    #[arg(long, value_name = "PREFIX")]
+    pub out: Option<PathBuf>,
+    /// Ticks a second
+    #[arg(long, value_name = "30|25", default_value = "30")]
+    pub tick_hz: TickRate,
+    /// Threads that solve islands; the result does not depend on it
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub threads: usize,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// Arguments of `status`.
 #[derive(Debug, Args)]
 pub struct StatusArgs {
@@ -74,6 +99,7 @@ impl Cli {
         match self.command.unwrap_or(Command::Run(self.run)) {
             Command::Run(args) => daemon::run(&args),
             Command::Check(args) => check::run(&args),
+            Command::Simulate(args) => simulate::run(&args),
             Command::Status(args) => status::run(&args),
         }
     }

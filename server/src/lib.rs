@@ -32,9 +32,11 @@ pub mod publish;
 pub mod report;
 pub mod sessions;
 pub mod shared;
+pub mod simulate;
 pub mod status;
 pub mod stopwatch;
 pub mod tick_thread;
+pub mod trace;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

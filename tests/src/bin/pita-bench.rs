@@ -1,5 +1,6 @@
 //! `pita-bench [NAME..] [--json]`: measurements by name; see [`pita_tests::bench`].
 
+use std::alloc::System;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -7,6 +8,11 @@ use pita_protocol::build_info::VERSION_AND_COMMIT;
 use pita_tests::bench::{ENTRIES, Options, select};
 use pita_tests::table::table;
 use serde_json::{Map, Value, json};
+use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
+
+/// Counts allocations for the measurements that ask.
+#[global_allocator]
+static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
 /// Measures PITA. Without names it measures everything; `pita-bench list` names what there is.
 #[derive(Parser)]

@@ -1,18 +1,13 @@
 //! `pita-yardstick SCENE_FILE K VARIANT OUT_PREFIX`: runs a `.scene` with K steps a tick and writes what the yardstick's
-//! judge reads.
-//!
-//! `OUT_PREFIX.tr`: little-endian f64 `[ticks + 1][bodies][13]` = centre of mass (3), quaternion w x y z, velocity (3),
-//! angular velocity in world axes (3); the first record is the start. `OUT_PREFIX.ms`: `[ticks][2]` = wall ms and CPU ms
-//! of all threads, of the step calls alone.
+//! judge reads, `OUT_PREFIX.tr` and `OUT_PREFIX.ms` (see [`pita_server::trace`]).
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Instant;
 
 use clap::Parser;
 use pita_game::scene::Scene;
-use pita_sim::{Settings, World};
-use rustix::time::{ClockId, clock_gettime};
+use pita_server::trace::Trace;
+use pita_sim::Settings;
 
 #[derive(Parser)]
 #[command(version = pita_protocol::build_info::VERSION_AND_COMMIT, about = "Runs a yardstick scene and writes its trace and times")]
@@ -42,15 +37,15 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     let settings = settings(arguments)?;
     let name = arguments.scene.display();
     let text = std::fs::read_to_string(&arguments.scene).map_err(|error| format!("{name}: {error}"))?;
-    let mut scene = Scene::parse(&text, &settings).map_err(|error| format!("{name}: {error}"))?;
-    let (mut trace, mut times) = (Vec::new(), Vec::new());
-    record(&scene, &mut trace);
+    let mut scene = Scene::parse(&text, &settings).map_err(|error| format!("{name}, {error}"))?;
+    let mut trace = Trace::default();
+    trace.record(&scene.world).map_err(|error| error.to_string())?;
     for _ in 0..scene.ticks {
-        times.extend(timed_tick(&mut scene.world, arguments.steps));
-        record(&scene, &mut trace);
+        let world = &mut scene.world;
+        trace.time(|| (0..arguments.steps).for_each(|_| drop(world.step())));
+        trace.record(&scene.world).map_err(|error| error.to_string())?;
     }
-    write(&arguments.out, "tr", &trace)?;
-    write(&arguments.out, "ms", &times)
+    trace.write(&arguments.out).map_err(|error| error.to_string())
 }
 
 /// Settings of the daemon with the variant's options on top.
@@ -75,35 +70,4 @@ fn settings(arguments: &Arguments) -> Result<Settings, String> {
     }
     settings.validate().map_err(|error| format!("variant {:?}: {error}", arguments.variant))?;
     Ok(settings)
-}
-
-/// Wall and CPU milliseconds of one tick.
-fn timed_tick(world: &mut World, steps: u32) -> [f64; 2] {
-    let (wall, cpu) = (Instant::now(), cpu_ms());
-    for _ in 0..steps {
-        world.step();
-    }
-    [wall.elapsed().as_secs_f64() * 1e3, cpu_ms() - cpu]
-}
-
-/// CPU time of all threads, ms.
-fn cpu_ms() -> f64 {
-    let time = clock_gettime(ClockId::ProcessCPUTime);
-    time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 * 1e-6
-}
-
-fn record(scene: &Scene, trace: &mut Vec<f64>) {
-    for slice in scene.world.slices() {
-        let (q, v) = (slice.q, slice.v);
-        trace.extend_from_slice(&q[..3]);
-        trace.extend_from_slice(&[q[6], q[3], q[4], q[5]]);
-        trace.extend_from_slice(v);
-    }
-}
-
-fn write(prefix: &Path, extension: &str, numbers: &[f64]) -> Result<(), String> {
-    let mut path = prefix.as_os_str().to_owned();
-    path.push(format!(".{extension}"));
-    let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
-    std::fs::write(&path, bytes).map_err(|error| format!("{}: {error}", Path::new(&path).display()))
 }

@@ -63,12 +63,11 @@ pub(crate) fn cholesky<const D: usize>(a: &Block<D>, floor: f64) -> Option<Block
     let mut l = zero();
     for i in 0..D {
         for j in 0..=i {
-            let mut s = a[i][j];
-            for k in 0..j {
-                s -= l[i][k] * l[j][k];
-            }
+            let (row_i, row_j): (&Entry<D>, &Entry<D>) = (&l[i], &l[j]);
+            let s = row_i[..j].iter().zip(row_j).fold(a[i][j], |s, (x, y)| s - x * y);
             if i == j {
-                if !(s > floor * a[i][i]) || a[i][i] <= 0.0 {
+                let positive = s > floor * a[i][i] && a[i][i] > 0.0;
+                if !positive {
                     return None;
                 }
                 l[i][i] = s.sqrt();

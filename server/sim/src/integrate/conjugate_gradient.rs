@@ -31,7 +31,8 @@ impl<const D: usize> ConjugateGradient<D> {
         for iteration in 1..=cap {
             a.multiply(&self.direction, &mut self.product);
             let curvature = inner(&self.direction, &self.product);
-            if !(curvature > 0.0) {
+            let convex = curvature > 0.0;
+            if !convex {
                 return iteration;
             }
             let alpha = rho / curvature;
@@ -40,7 +41,8 @@ impl<const D: usize> ConjugateGradient<D> {
             self.preconditioned.clone_from(&self.residual);
             a.precondition(&mut self.preconditioned);
             let next = inner(&self.residual, &self.preconditioned);
-            if !(next > goal) {
+            let unsolved = next > goal;
+            if !unsolved {
                 return iteration;
             }
             let beta = next / rho;

@@ -61,15 +61,12 @@ impl<const D: usize> System<D> {
     pub fn assemble(&mut self, problem: &mut Problem) {
         for (block, node) in self.diagonal.iter_mut().zip(&problem.nodes) {
             *block = zero();
-            for i in 0..3 {
-                block[i][i] = node.mass;
-            }
-            if D == 6 {
-                for j in 0..3 {
-                    let column = node.inertia.col(j).to_array();
-                    for i in 0..3 {
-                        block[3 + i][3 + j] = column[i];
-                    }
+            for (i, row) in block.iter_mut().enumerate() {
+                if i < 3 {
+                    row[i] = node.mass;
+                } else {
+                    // The inertia is symmetric: its columns are its rows.
+                    row[3..].copy_from_slice(&node.inertia.col(i - 3).to_array());
                 }
             }
         }
