@@ -86,7 +86,8 @@ fn documents_name_what_is_there() {
         });
         let within = ["server/sim/src", "server/game/src"];
         for path in paths {
-            let found = root().join(path).exists() || within.iter().any(|folder| root().join(folder).join(path).exists());
+            let found =
+                root().join(path).exists() || within.iter().any(|folder| root().join(folder).join(path).exists());
             assert!(found, "{document} names `{path}`");
         }
     }
