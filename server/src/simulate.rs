@@ -43,7 +43,7 @@ pub enum SimulateError {
 
 /// What is run.
 enum Subject {
-    Scene(Scene),
+    Scene(Box<Scene>),
     Arena(Box<Arena>),
 }
 
@@ -69,7 +69,10 @@ impl Subject {
         let text = std::fs::read_to_string(&args.scene)
             .map_err(|reason| SimulateError::Unreadable { file: file.clone(), reason })?;
         let settings = Settings { threads: args.threads, ..Settings::at(1.0 / f64::from(tick_hz)) };
-        Scene::parse(&text, &settings).map(Self::Scene).map_err(|reason| SimulateError::Scene { file, reason })
+        match Scene::parse(&text, &settings) {
+            Ok(scene) => Ok(Self::Scene(Box::new(scene))),
+            Err(reason) => Err(SimulateError::Scene { file, reason }),
+        }
     }
 
     fn world(&self) -> &World {

@@ -110,6 +110,8 @@ pub struct Arena {
     events: Vec<ArenaEvent>,
     /// Kept from tick to tick for its memory.
     commands: Vec<Command>,
+    /// Likewise: actors of this tick.
+    acting: Vec<u32>,
 }
 
 impl Arena {
@@ -179,8 +181,10 @@ impl Arena {
 
     /// Stage 3: puts back what got lost and lets every actor act, in order of id.
     pub(crate) fn run_logic(&mut self) {
-        let ids: Vec<u32> = self.actors.keys().copied().collect();
-        for id in ids {
+        let mut ids = std::mem::take(&mut self.acting);
+        ids.clear();
+        ids.extend(self.actors.keys());
+        for &id in &ids {
             if self.is_lost(id) {
                 self.put_back(id);
             }
@@ -190,6 +194,7 @@ impl Arena {
                 self.put_back(id);
             }
         }
+        self.acting = ids;
     }
 
     /// Stage 4: one implicit step of the whole world.

@@ -32,7 +32,7 @@ impl Ports for Drivers {
     fn collect(&mut self, tick: u64, into: &mut Vec<Command>) {
         into.append(&mut self.commands);
         // Everybody drives an eight: left for four seconds, right for four.
-        let steer = if tick / 120 % 2 == 0 { 0.4 } else { -0.4 };
+        let steer = if (tick / 120).is_multiple_of(2) { 0.4 } else { -0.4 };
         let controls = Controls { throttle: 0.6, steer, ..Controls::default() };
         into.extend((0..CARS).map(|slot| Command::Drive { slot, controls }));
     }

@@ -42,7 +42,11 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     trace.record(&scene.world).map_err(|error| error.to_string())?;
     for _ in 0..scene.ticks {
         let world = &mut scene.world;
-        trace.time(|| (0..arguments.steps).for_each(|_| drop(world.step())));
+        trace.time(|| {
+            for _ in 0..arguments.steps {
+                world.step();
+            }
+        });
         trace.record(&scene.world).map_err(|error| error.to_string())?;
     }
     trace.write(&arguments.out).map_err(|error| error.to_string())

@@ -40,6 +40,7 @@ impl Arena {
             slots: BTreeMap::new(),
             events: Vec::new(),
             commands: Vec::new(),
+            acting: Vec::new(),
         };
         arena.add_statics(&file)?;
         arena.add_props(&file)?;
