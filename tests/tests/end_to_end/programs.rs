@@ -2,10 +2,12 @@
 
 use std::process::Command;
 
+use pita_tests::process::{Pid, Process, Signal};
+use rustix::process::kill_process;
 use serde_json::Value;
 
 use crate::run::{Ended, free_port, run};
-use crate::start_server;
+use crate::{LONG, await_clients, start_server};
 
 #[test]
 fn a_short_load_test_measures_each_step_and_leaves_its_figures() {
@@ -43,6 +45,31 @@ async fn the_load_test_measures_a_running_server_and_leaves_it_running() {
     let Ended { success, said } = run(command.arg("--out").arg(folder.path()));
     assert!(success && said.contains("\"server_cores\": null"), "{said}");
     assert_eq!(observer.status().await.unwrap().clients, 0);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_lost_client_fails_the_load_test_after_its_report() {
+    let (server, observer) = start_server().await;
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = load_test();
+    command.args(["--connect", &server.endpoint, "--clients", "2", "--ticks", "60"]).arg("--out").arg(folder.path());
+    let mut process = Process::start("the load test", &mut command).unwrap();
+    await_clients(&observer, 2).await;
+
+    let bots = only_child_of(&process);
+    kill_process(bots, Signal::STOP).unwrap();
+    await_clients(&observer, 0).await;
+    kill_process(bots, Signal::CONT).unwrap();
+
+    let status = process.wait(LONG).unwrap();
+    let said = process.output();
+    assert!(!status.success() && said.contains("2 clients were lost"), "{status}: {said}");
+}
+
+fn only_child_of(process: &Process) -> Pid {
+    let pid = process.pid();
+    let children = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children")).unwrap();
+    children.trim().parse().ok().and_then(Pid::from_raw).unwrap_or_else(|| panic!("not one child: {children:?}"))
 }
 
 #[test]
