@@ -110,7 +110,7 @@ impl Process {
     pub fn line_with(&mut self, part: &str, within: Duration) -> Result<String, ProcessError> {
         match self.output.line_with(part, within) {
             Some(line) => Ok(line),
-            None => Err(self.failed(format!("did not print \"{part}\" within {within:?}"))),
+            None => Err(self.failed(format!("ended or waited {within:?} without printing \"{part}\""))),
         }
     }
 

@@ -7,7 +7,7 @@ use rustix::process::kill_process;
 use serde_json::Value;
 
 use crate::run::{Ended, free_port, run};
-use crate::{LONG, await_clients, start_server};
+use crate::{LONG, await_clients, eventually, start_server};
 
 #[test]
 fn a_short_load_test_measures_each_step_and_leaves_its_figures() {
@@ -52,9 +52,14 @@ async fn a_lost_client_fails_the_load_test_after_its_report() {
     let (server, observer) = start_server().await;
     let folder = tempfile::tempdir().unwrap();
     let mut command = load_test();
-    command.args(["--connect", &server.endpoint, "--clients", "2", "--ticks", "60"]).arg("--out").arg(folder.path());
+    command.args(["--connect", &server.endpoint, "--clients", "2", "--ticks", "200"]).arg("--out").arg(folder.path());
     let mut process = Process::start("the load test", &mut command).unwrap();
     await_clients(&observer, 2).await;
+    let joined = observer.status().await.unwrap().tick;
+    eventually("both to drive for a second", async || {
+        (observer.status().await.unwrap().tick > joined + 30).then_some(())
+    })
+    .await;
 
     let bots = only_child_of(&process);
     kill_process(bots, Signal::STOP).unwrap();
