@@ -18,7 +18,7 @@ async fn main() -> Result<(), ClientError> {
     let until = Instant::now() + Duration::from_secs(10);
     while Instant::now() < until {
         let snapshot = session.next_snapshot().await?;
-        session.send(Controls { throttle: 0.6, steer: -0.4, ..Controls::default() }).await?;
+        session.send(Controls { throttle: 0.2, steer: -0.8, ..Controls::default() }).await?;
         if snapshot.tick() % 30 == 0
             && let Some([x, y, z]) = position(&session)
         {
