@@ -1,6 +1,6 @@
 //! Collision detection: which DOF are incompatible, and where.
 //!
-//! Once a tick, at Q0, with margins that cover the tick's motion: [`broad_phase`] prunes, [`narrow_phase`] finds the
+//! Once a tick, at Q0, with margins that cover the tick's motion: `broad_phase` prunes, `narrow_phase` finds the
 //! points. What comes out are contact points; [`potential::contact`](crate::potential) makes potentials of them.
 
 mod broad_phase;

@@ -1,7 +1,7 @@
 //! Implicit Euler: from Q0, Q0' and the potentials to Q1, Q1' (the talk's "BOOM!").
 //!
-//! [`problem`] is an island with its potentials as one residual; [`newton`] makes the residual zero (the Cel Damage
-//! solver: truncated Newton), with the [`line_search`], the sparse [`system`] and the [`conjugate_gradient`] under it.
+//! `problem` is an island with its potentials as one residual; `newton` makes the residual zero (the Cel Damage
+//! solver: truncated Newton), with the `line_search`, the sparse `system` and the `conjugate_gradient` under it.
 //! Islands share nothing while they are solved, so that threads cannot change the result.
 
 pub(crate) mod block;
