@@ -66,8 +66,8 @@ pub struct SimulateArgs {
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
     /// Ticks to run; the scene's own number, or a minute of an arena, where it is not given
-    #[arg(long, value_name = "N")]
-    pub ticks: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub ticks: Option<u32>,
     /// Write PREFIX.tr (states) and PREFIX.ms (times) for the yardstick's judge
     #[arg(long, value_name = "PREFIX")]
     pub out: Option<PathBuf>,
@@ -75,8 +75,8 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "30|25", default_value = "30")]
     pub tick_hz: TickRate,
     /// Threads that solve islands; the result does not depend on it
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub threads: usize,
+    #[arg(long, value_name = "1..64", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
+    pub threads: u16,
     /// Print JSON instead of a table
     #[arg(long)]
     pub json: bool,

@@ -11,7 +11,7 @@ use pita_sim::{Energy, Momentum, Settings, StepReport, World};
 use serde_json::json;
 
 use crate::cli::SimulateArgs;
-use crate::trace::{Trace, TraceError};
+use crate::trace::{self, Trace, TraceError};
 use crate::{arena_source, report};
 
 /// Why a run cannot start or go on.
@@ -62,13 +62,13 @@ impl Subject {
     fn load(args: &SimulateArgs) -> Result<Self, SimulateError> {
         let tick_hz = args.tick_hz.hz();
         if args.scene.extension().is_none_or(|extension| extension != "scene") {
-            let settings = ArenaSettings { tick_hz, threads: args.threads };
+            let settings = ArenaSettings { tick_hz, threads: usize::from(args.threads) };
             return Ok(Self::Arena(Box::new(arena_source::load(&args.scene.to_string_lossy(), &settings)?)));
         }
         let file = args.scene.display().to_string();
         let text = std::fs::read_to_string(&args.scene)
             .map_err(|reason| SimulateError::Unreadable { file: file.clone(), reason })?;
-        let settings = Settings { threads: args.threads, ..Settings::at(1.0 / f64::from(tick_hz)) };
+        let settings = Settings { threads: usize::from(args.threads), ..Settings::at(1.0 / f64::from(tick_hz)) };
         match Scene::parse(&text, &settings) {
             Ok(scene) => Ok(Self::Scene(Box::new(scene))),
             Err(reason) => Err(SimulateError::Scene { file, reason }),
@@ -113,26 +113,25 @@ pub fn run(args: &SimulateArgs) -> ExitCode {
 
 fn simulate(args: &SimulateArgs) -> Result<Summary, SimulateError> {
     let mut subject = Subject::load(args)?;
-    let ticks = args.ticks.unwrap_or_else(|| subject.usual_ticks(args.tick_hz.hz()));
+    let ticks = args.ticks.map_or_else(|| subject.usual_ticks(args.tick_hz.hz()), |ticks| ticks as usize);
     let mut summary = Summary::new(args, subject.world());
-    let mut trace = Trace::default();
-    if args.out.is_some() {
+    let mut trace = args.out.as_deref().map(Trace::create).transpose()?;
+    if let Some(trace) = &mut trace {
         trace.record(subject.world())?;
     }
     let progress = progress_bar(ticks);
     for _ in 0..ticks {
-        let wall_ms = trace.time(|| subject.tick());
-        summary.add(wall_ms, subject.world().report());
-        if args.out.is_some() {
+        let took = trace::time(|| subject.tick());
+        summary.add(took.wall_ms, subject.world().report());
+        if let Some(trace) = &mut trace {
+            trace.record_time(took)?;
             trace.record(subject.world())?;
         }
         progress.inc(1);
     }
     progress.finish_and_clear();
     summary.finish(subject.world());
-    if let Some(prefix) = &args.out {
-        trace.write(prefix)?;
-    }
+    trace.map_or(Ok(()), Trace::finish)?;
     Ok(summary)
 }
 
@@ -182,7 +181,7 @@ impl Summary {
         self.total.worst_penetration = self.total.worst_penetration.max(tick.worst_penetration);
         self.total.worst_joint_gap = self.total.worst_joint_gap.max(tick.worst_joint_gap);
         self.total.residual = self.total.residual.max(tick.residual);
-        self.dof = tick.dof;
+        self.dof = self.dof.max(tick.dof);
     }
 
     fn finish(&mut self, world: &World) {

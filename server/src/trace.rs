@@ -4,19 +4,24 @@
 //! angular velocity in world axes (3); the first record is the start. `PREFIX.ms`: `[ticks][2]` = wall ms and CPU ms of
 //! all threads, of the engine alone.
 
+use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use pita_sim::{DofKind, World};
 use rustix::time::{ClockId, clock_gettime};
 
-/// What a run leaves behind.
-#[derive(Default)]
+/// What a run leaves behind, written while it runs.
 pub struct Trace {
-    states: Vec<f64>,
-    times: Vec<[f64; 2]>,
+    states: Output,
+    times: Output,
     bodies: Option<usize>,
+}
+
+struct Output {
+    path: PathBuf,
+    file: BufWriter<File>,
 }
 
 /// Why a trace cannot go on or be written.
@@ -41,10 +46,18 @@ pub enum TraceError {
 }
 
 impl Trace {
+    /// Opens `prefix.tr` and `prefix.ms`.
+    ///
+    /// # Errors
+    /// [`TraceError::Unwritable`].
+    pub fn create(prefix: &Path) -> Result<Self, TraceError> {
+        Ok(Self { states: Output::create(prefix, "tr")?, times: Output::create(prefix, "ms")?, bodies: None })
+    }
+
     /// Appends the state of `world`.
     ///
     /// # Errors
-    /// [`TraceError::BodiesChanged`].
+    /// [`TraceError`].
     pub fn record(&mut self, world: &World) -> Result<(), TraceError> {
         let now = world.body_count();
         let before = *self.bodies.get_or_insert(now);
@@ -57,31 +70,45 @@ impl Trace {
                 DofKind::RigidBody => ([q[6], q[3], q[4], q[5]], [v[3], v[4], v[5]]),
                 DofKind::Particle => ([1.0, 0.0, 0.0, 0.0], [0.0; 3]),
             };
-            self.states.extend_from_slice(&q[..3]);
-            self.states.extend_from_slice(&rotation);
-            self.states.extend_from_slice(&v[..3]);
-            self.states.extend_from_slice(&spin);
+            for numbers in [&q[..3], &rotation, &v[..3], &spin] {
+                self.states.write(numbers)?;
+            }
         }
         Ok(())
     }
 
-    /// Runs `tick` and appends what it took. Answers its wall time, ms.
-    pub fn time(&mut self, tick: impl FnOnce()) -> f64 {
-        let (wall, cpu) = (Instant::now(), process_cpu_ms());
-        tick();
-        let wall_ms = wall.elapsed().as_secs_f64() * 1e3;
-        self.times.push([wall_ms, process_cpu_ms() - cpu]);
-        wall_ms
-    }
-
-    /// Writes `prefix.tr` and `prefix.ms`.
+    /// Appends what a tick took, ms.
     ///
     /// # Errors
     /// [`TraceError::Unwritable`].
-    pub fn write(&self, prefix: &Path) -> Result<(), TraceError> {
-        write(prefix, "tr", &self.states)?;
-        write(prefix, "ms", self.times.as_flattened())
+    pub fn record_time(&mut self, took: TickTime) -> Result<(), TraceError> {
+        self.times.write(&[took.wall_ms, took.cpu_ms])
     }
+
+    /// Writes what is still in memory.
+    ///
+    /// # Errors
+    /// [`TraceError::Unwritable`].
+    pub fn finish(mut self) -> Result<(), TraceError> {
+        self.states.flush()?;
+        self.times.flush()
+    }
+}
+
+/// What a tick took.
+#[derive(Clone, Copy, Debug)]
+pub struct TickTime {
+    /// On the clock, ms.
+    pub wall_ms: f64,
+    /// CPU time of all threads, ms.
+    pub cpu_ms: f64,
+}
+
+/// Runs `tick` and answers what it took.
+pub fn time(tick: impl FnOnce()) -> TickTime {
+    let (wall, cpu) = (Instant::now(), process_cpu_ms());
+    tick();
+    TickTime { wall_ms: wall.elapsed().as_secs_f64() * 1e3, cpu_ms: process_cpu_ms() - cpu }
 }
 
 /// CPU time of all threads, ms.
@@ -90,14 +117,27 @@ fn process_cpu_ms() -> f64 {
     time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 * 1e-6
 }
 
-fn write(prefix: &Path, extension: &str, numbers: &[f64]) -> Result<(), TraceError> {
-    let mut path = prefix.as_os_str().to_owned();
-    path.push(format!(".{extension}"));
-    let path = Path::new(&path);
-    let unwritable = |reason| TraceError::Unwritable { file: path.display().to_string(), reason };
-    let mut file = BufWriter::new(std::fs::File::create(path).map_err(unwritable)?);
-    for number in numbers {
-        file.write_all(&number.to_le_bytes()).map_err(unwritable)?;
+impl Output {
+    fn create(prefix: &Path, extension: &str) -> Result<Self, TraceError> {
+        let mut path = prefix.as_os_str().to_owned();
+        path.push(format!(".{extension}"));
+        let path = PathBuf::from(path);
+        match File::create(&path) {
+            Ok(file) => Ok(Self { path, file: BufWriter::new(file) }),
+            Err(reason) => Err(unwritable(&path, reason)),
+        }
     }
-    file.flush().map_err(unwritable)
+
+    fn write(&mut self, numbers: &[f64]) -> Result<(), TraceError> {
+        let Self { path, file } = self;
+        numbers.iter().try_for_each(|x| file.write_all(&x.to_le_bytes())).map_err(|reason| unwritable(path, reason))
+    }
+
+    fn flush(&mut self) -> Result<(), TraceError> {
+        self.file.flush().map_err(|reason| unwritable(&self.path, reason))
+    }
+}
+
+fn unwritable(path: &Path, reason: io::Error) -> TraceError {
+    TraceError::Unwritable { file: path.display().to_string(), reason }
 }

@@ -205,7 +205,7 @@ mod tests {
             (&format!("{BALL}ball 0 1 0 0 0 0 0 0"), "line 2: no body 1 above this line"),
             (&format!("{BALL}ball 0 0 0 0 0 0 0 0"), "line 2: both ends are at the same body"),
             (&format!("{BALL}wheel 0 -1 0 0 0 0 1 1 1 1 1"), "line 2: a wheel needs two bodies"),
-            (&BALL.replace("0.5 0 0 1 0.1", "0.5 0 0 -1 0.1"), "line 1: mass is -1, allowed is above 0 kg"),
+            (&BALL.replace("0.5 0 0 1 0.1", "0.5 0 0 -1 0.1"), "line 1: mass is -1, allowed is 1e-6 to below 1e9 kg"),
             (&BALL.replace("sphere", "teapot"), "line 1: shape must be box, sphere or capsule"),
         ] {
             assert!(error(text).starts_with(expected), "{text}: {}", error(text));

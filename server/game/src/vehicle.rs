@@ -22,6 +22,12 @@ use rig::{Rig, WHEELS, Wheel};
 /// car is reset on a slope.
 const RESET_LIFT: f64 = 0.3;
 
+/// Speed above which a car cannot be reset, m/s.
+const RESET_SPEED_MAX: f64 = 3.0;
+
+/// Time between two resets of a car, s.
+const RESET_REST: f64 = 2.0;
+
 /// Slip at which a driven wheel's torque passes from none to full, rad/s. A motor that switches within a smaller band is
 /// stiff against the wheel's inertia and costs Newton iterations; a wider one leaves top speed short.
 const MOTOR_BAND: f64 = 4.0;
@@ -35,6 +41,8 @@ pub struct Vehicle {
     controls: Controls,
     response: Response,
     reset_was_held: bool,
+    /// Time until the reset button works again, s.
+    reset_rest: f64,
 }
 
 impl Vehicle {
@@ -53,16 +61,20 @@ impl Vehicle {
         let Identity { id, name, slot } = identity;
         let info = ActorInfo { id, kind: "vehicle", name, slot, parts: rig.parts(world) };
         let (controls, response) = (Controls::default(), Response::default());
-        Ok(Self { info, parameters, rig, driver, controls, response, reset_was_held: false })
+        Ok(Self { info, parameters, rig, driver, controls, response, reset_was_held: false, reset_rest: 0.0 })
     }
 
-    /// Puts the car back on its wheels where it is, when the button goes down.
+    /// Puts the car back on its wheels where it is, when the button goes down. Not while it still moves fast, nor again
+    /// at once: it would be a brake, and a ladder.
     fn reset_if_asked(&mut self, step: &mut Step, motion: &Motion) -> Result<(), SimError> {
         let asked = self.controls.reset && !self.reset_was_held;
         self.reset_was_held = self.controls.reset;
-        if !asked {
+        self.reset_rest = (self.reset_rest - step.dt).max(0.0);
+        let speed = motion.velocity.length();
+        if !asked || self.reset_rest > 0.0 || speed > RESET_SPEED_MAX {
             return Ok(());
         }
+        self.reset_rest = RESET_REST;
         let lift = RESET_LIFT - self.parameters.chassis_half[1];
         let pose = Pose { position: motion.position + DVec3::Y * lift, yaw: motion.yaw() };
         self.place(step.world, pose)

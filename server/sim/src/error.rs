@@ -32,11 +32,14 @@ pub(crate) fn require(ok: bool, what: &'static str, value: f64, allowed: &'stati
     if ok && value.is_finite() { Ok(()) } else { Err(SimError::OutOfRange { what, value, allowed }) }
 }
 
-/// `Err` unless all numbers are finite and smaller than 1e9.
+/// Bound of every coordinate, speed and force: squares and products of such numbers stay finite.
+pub(crate) const LARGEST: f64 = 1e9;
+
+/// `Err` unless all numbers are finite and smaller than [`LARGEST`].
 pub(crate) fn require_vector(vector: glam::DVec3, what: &'static str) -> Result<(), SimError> {
     let largest = vector.abs().max_element();
     let value = if vector.is_finite() { largest } else { f64::NAN };
-    require(largest < 1e9, what, value, "finite and below 1e9")
+    require(largest < LARGEST, what, value, "finite and below 1e9")
 }
 
 /// `Err` unless the quaternion is finite and of unit length within 1e-3.

@@ -205,7 +205,6 @@ impl World {
             return Err(SimError::Unusable { what: "an axle needs two different rigid bodies" });
         }
         self.detector.exclude(chassis.serial, wheel.serial);
-        self.bodies[desc.wheel].is_wheel = true;
         Ok(self.potentials.axles.insert(desc))
     }
 
@@ -233,7 +232,11 @@ impl World {
 
     /// Removes a ball joint. Answers whether there was one.
     pub fn remove_ball_joint(&mut self, id: BallJointId) -> bool {
-        self.potentials.ball_joints.remove(id).is_some()
+        let Some(joint) = self.potentials.ball_joints.remove(id) else { return false };
+        if let (Some(a), Some(b)) = (joint.desc.a.body, joint.desc.b.body) {
+            self.detector.include(self.bodies[a].serial, self.bodies[b].serial);
+        }
+        true
     }
 
     /// Removes a controller. Answers whether there was one.
@@ -327,6 +330,7 @@ impl World {
         let body = self.bodies.get_mut(id).ok_or(SimError::Gone { what: "the body" })?;
         body.set_pose(Pose { position, rotation: rotation.normalize() }, &mut self.state);
         body.quarantined = false;
+        body.impulse = Twist::REST;
         let serial = body.serial;
         self.detector.forget_contacts(serial);
         Ok(())

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use pita_game::scene::Scene;
-use pita_server::trace::Trace;
+use pita_server::trace::{self, Trace};
 use pita_sim::Settings;
 
 #[derive(Parser)]
@@ -38,18 +38,18 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     let name = arguments.scene.display();
     let text = std::fs::read_to_string(&arguments.scene).map_err(|error| format!("{name}: {error}"))?;
     let mut scene = Scene::parse(&text, &settings).map_err(|error| format!("{name}, {error}"))?;
-    let mut trace = Trace::default();
+    let mut trace = Trace::create(&arguments.out).map_err(|error| error.to_string())?;
     trace.record(&scene.world).map_err(|error| error.to_string())?;
     for _ in 0..scene.ticks {
         let world = &mut scene.world;
-        trace.time(|| {
+        let took = trace::time(|| {
             for _ in 0..arguments.steps {
                 world.step();
             }
         });
-        trace.record(&scene.world).map_err(|error| error.to_string())?;
+        trace.record_time(took).and_then(|()| trace.record(world)).map_err(|error| error.to_string())?;
     }
-    trace.write(&arguments.out).map_err(|error| error.to_string())
+    trace.finish().map_err(|error| error.to_string())
 }
 
 /// Settings of the daemon with the variant's options on top.

@@ -41,6 +41,7 @@ impl BroadPhase {
         if self.order.len() != bounds.len() {
             self.order.clear();
             self.order.extend(0..bounds.len() as u32);
+            self.order.sort_by(|&a, &b| bounds[a as usize].min.x.total_cmp(&bounds[b as usize].min.x));
         }
         let start = |i: u32| bounds[i as usize].min.x;
         insertion_sort(&mut self.order, |&a, &b| start(a) > start(b));

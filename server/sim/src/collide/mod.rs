@@ -111,7 +111,7 @@ struct Static {
 pub(crate) struct Detector {
     statics: slotmap::SlotMap<StaticId, Static>,
     static_serials: u32,
-    /// Pairs of bodies that never collide, by serial, smaller first; sorted.
+    /// Pairs of bodies that never collide, by serial, smaller first; sorted, and once for every reason.
     excluded: Vec<(u32, u32)>,
     broad_phase: BroadPhase,
     narrow_phase: NarrowPhase,
@@ -139,11 +139,17 @@ impl Detector {
         self.statics.remove(id).is_some()
     }
 
-    /// The two bodies never collide with each other.
+    /// The two bodies do not collide with each other, for one reason more.
     pub fn exclude(&mut self, a: u32, b: u32) {
         let pair = (a.min(b), a.max(b));
-        if let Err(place) = self.excluded.binary_search(&pair) {
-            self.excluded.insert(place, pair);
+        let place = self.excluded.partition_point(|other| other < &pair);
+        self.excluded.insert(place, pair);
+    }
+
+    /// Takes one [`Detector::exclude`] back.
+    pub fn include(&mut self, a: u32, b: u32) {
+        if let Ok(place) = self.excluded.binary_search(&(a.min(b), a.max(b))) {
+            self.excluded.remove(place);
         }
     }
 
@@ -169,6 +175,7 @@ impl Detector {
         self.narrow_phase.begin();
         let mut pairs = self.pairs.iter().peekable();
         for (i, &id) in (0..).zip(bodies) {
+            while pairs.next_if(|&&(a, _)| a < i).is_some() {}
             let Some(body) = &look(id) else { continue };
             while let Some(&(_, j)) = pairs.next_if(|&&(a, _)| a == i) {
                 let Some(other) = &look(bodies[j as usize]) else { continue };

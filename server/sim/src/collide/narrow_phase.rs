@@ -189,10 +189,9 @@ fn margin(speed: f64, reach: f64, settings: &Settings) -> f64 {
 fn reach(body: &Moving, settings: &Settings) -> f64 {
     // A surface of revolution stays where it is however fast it spins about its axis.
     let spin = body.twist.angular;
-    let across = match body.collider.shape() {
-        Shape::Ball { .. } => DVec3::ZERO,
-        Shape::Cylinder { .. } => spin.reject_from_normalized(body.pose.rotation * DVec3::Z),
-        Shape::Capsule { .. } => spin.reject_from_normalized(body.pose.rotation * DVec3::X),
+    let across = match (body.collider.shape(), body.collider.shape().revolution_axis()) {
+        (Shape::Ball { .. }, _) => DVec3::ZERO,
+        (_, Some(axis)) => spin.reject_from_normalized(body.pose.rotation * axis),
         _ => spin,
     };
     (settings.dt * across.length()).min(2.0) * body.collider.bounding_radius()

@@ -117,6 +117,16 @@ impl Shape {
         }
     }
 
+    /// Axis in the body's frame about which the shape may spin without moving its surface. A ball has every axis, and its
+    /// contacts' arms lie along their normals anyway.
+    pub(crate) fn revolution_axis(&self) -> Option<DVec3> {
+        match self {
+            Self::Capsule { .. } => Some(DVec3::X),
+            Self::Cylinder { .. } => Some(DVec3::Z),
+            _ => None,
+        }
+    }
+
     /// Radius of the ball around the body's origin that contains the shape; infinite for a half-space.
     pub(crate) fn bounding_radius(&self) -> f64 {
         match self {
@@ -233,7 +243,20 @@ impl Collider {
     /// [`SimError`] naming the first value that is out of range.
     pub fn validate(&self) -> Result<(), SimError> {
         require((0.0..=10.0).contains(&self.friction), "friction", self.friction, "0 to 10")?;
-        self.shape.validate()
+        self.shape.validate()?;
+        // What passes the checks above and is still no hull would pass through everything.
+        if self.parry.is_some() { Ok(()) } else { Err(SimError::Unusable { what: FLAT_HULL }) }
+    }
+
+    /// [`Collider::validate`] for what moves.
+    ///
+    /// # Errors
+    /// As there, and for a half-space, which has no bounds.
+    pub(crate) fn validate_moving(&self) -> Result<(), SimError> {
+        match self.shape {
+            Shape::HalfSpace { .. } => Err(SimError::Unusable { what: "a half-space cannot move: use a box" }),
+            _ => self.validate(),
+        }
     }
 
     /// Shape for the fine phase and its pose, given the body's.

@@ -9,7 +9,7 @@ pub(crate) mod rigid_body;
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::collide::Collider;
-use crate::error::{SimError, require, require_rotation, require_vector};
+use crate::error::{LARGEST, SimError, require, require_rotation, require_vector};
 use crate::state::{Slice, State};
 
 slotmap::new_key_type! {
@@ -235,8 +235,9 @@ impl Body {
         }
     }
 
-    pub fn is_finite(&self, state: &State) -> bool {
-        state.q(self.slice).iter().chain(state.v(self.slice)).all(|x| x.is_finite())
+    /// Whether every number of the state is one that the setters would take.
+    pub fn is_sane(&self, state: &State) -> bool {
+        state.q(self.slice).iter().chain(state.v(self.slice)).all(|x| x.abs() < LARGEST)
     }
 
     /// Angular momentum about the centre of mass, kg m²/s.
@@ -251,21 +252,25 @@ impl Body {
     }
 }
 
+fn validate_mass(mass: f64) -> Result<(), SimError> {
+    require((1e-6..LARGEST).contains(&mass), "mass", mass, "1e-6 to below 1e9 kg")
+}
+
 pub(crate) fn validate_rigid_body(desc: &RigidBodyDesc) -> Result<(), SimError> {
     require_vector(desc.position, "position")?;
     require_rotation(desc.rotation, "rotation")?;
     require_vector(desc.velocity, "velocity")?;
     require_vector(desc.angular_velocity, "angular_velocity")?;
-    require(desc.mass > 0.0, "mass", desc.mass, "above 0 kg")?;
+    validate_mass(desc.mass)?;
     require_vector(desc.inertia, "inertia")?;
     let least = desc.inertia.min_element();
-    require(least > 0.0, "inertia", least, "above 0 kg m²")?;
-    desc.collider.as_ref().map_or(Ok(()), Collider::validate)
+    require(least >= 1e-12, "inertia", least, "1e-12 to below 1e9 kg m²")?;
+    desc.collider.as_ref().map_or(Ok(()), Collider::validate_moving)
 }
 
 pub(crate) fn validate_particle(desc: &ParticleDesc) -> Result<(), SimError> {
     require_vector(desc.position, "position")?;
     require_vector(desc.velocity, "velocity")?;
-    require(desc.mass > 0.0, "mass", desc.mass, "above 0 kg")?;
-    desc.collider.as_ref().map_or(Ok(()), Collider::validate)
+    validate_mass(desc.mass)?;
+    desc.collider.as_ref().map_or(Ok(()), Collider::validate_moving)
 }

@@ -15,7 +15,7 @@ pub(super) struct ConjugateGradient<const D: usize> {
 
 impl<const D: usize> ConjugateGradient<D> {
     /// Solves A x = −g until the preconditioned residual has shrunk to `forcing`, or to the cap. Answers the number of
-    /// iterations. `x` always is a direction of descent.
+    /// iterations. `x` is a direction of descent, or zero where A is not positive definite along the first direction.
     pub fn solve(&mut self, a: &System<D>, g: &[Entry<D>], forcing: f64, x: &mut Vec<Entry<D>>) -> usize {
         let cap = iteration_cap(D * g.len());
         x.clear();

@@ -41,7 +41,10 @@ impl<const D: usize> Newton<D> {
             info.evaluations += 1;
             info.residual = problem.residual_speed(&self.residual);
             info.converged = info.residual <= settings.tolerance;
-            if info.converged || info.newton_iterations == settings.newton_iterations || !info.residual.is_finite() {
+            if !info.residual.is_finite() {
+                return self.retreat(problem, info);
+            }
+            if info.converged || info.newton_iterations == settings.newton_iterations {
                 return info;
             }
             if info.newton_iterations == 0 {
@@ -55,7 +58,8 @@ impl<const D: usize> Newton<D> {
         }
     }
 
-    /// Starts at the cheapest of: the motion without potentials, last tick's motion, rest. Answers the evaluations.
+    /// Starts at the cheapest, in incremental potential, of: the motion without potentials, last tick's motion, rest, and
+    /// last tick's impulses once more. Answers the evaluations.
     fn guess(&mut self, problem: &mut Problem) -> usize {
         const CANDIDATES: [fn(&Node) -> Twist; 4] = [
             |node| node.start_from(node.target),
@@ -76,6 +80,14 @@ impl<const D: usize> Newton<D> {
         }
         problem.move_to(&self.u);
         CANDIDATES.len()
+    }
+
+    /// Back to where the last step began: one body's overflow must not spread over its island.
+    fn retreat(&mut self, problem: &mut Problem, info: NewtonInfo) -> NewtonInfo {
+        if info.newton_iterations > 0 {
+            problem.move_to(&self.start);
+        }
+        NewtonInfo { residual: f64::INFINITY, ..info }
     }
 
     /// Walks along the step; leaves `u` and the trial where it ends. Answers the evaluations.

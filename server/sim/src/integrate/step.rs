@@ -1,6 +1,7 @@
 //! One integration of the whole world: bodies and potentials are sorted into islands, islands are solved, the answers
 //! are written to Q and Q'.
 
+use glam::DVec3;
 use rayon::iter::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 use slotmap::SlotMap;
 
@@ -79,6 +80,13 @@ impl Integrator {
         let Settings { dt, gravity, .. } = *scene.settings;
         self.nodes.clear();
         self.active.clear();
+        for body in scene.bodies.values_mut() {
+            body.is_wheel = false;
+        }
+        for axle in scene.potentials.axles.values() {
+            let carried = scene.bodies.get(axle.chassis).is_some_and(|chassis| !chassis.quarantined);
+            scene.bodies[axle.wheel].is_wheel = carried;
+        }
         for &id in scene.order {
             let body = &mut scene.bodies[id];
             body.index = if body.quarantined { ABSENT } else { self.active.len() as u32 };
@@ -86,6 +94,8 @@ impl Integrator {
                 self.active.push(id);
                 self.nodes.push(body.node(scene.state, dt, gravity));
             }
+            // Forces are for one tick, whether the body takes part in it or not.
+            (body.force, body.torque) = Default::default();
         }
     }
 
@@ -126,9 +136,10 @@ impl Integrator {
         let Settings { dt, solver, contact: contact_settings, .. } = scene.settings;
         for (source, contact) in (0u32..).zip(scene.contacts.iter()) {
             let Some(ends) = self.contact_ends[source as usize] else { continue };
+            let bodies = ends.map(|end| self.active.get(end as usize).map(|&id| &scene.bodies[id]));
             let Some((solve, nodes)) = self.localise(ends) else { continue };
             let all = &solve.problem.nodes;
-            let arms = nodes.map(|i| arm(all, i, contact.position));
+            let arms = [0, 1].map(|i| arm(all, nodes[i], bodies[i], contact));
             let mass = reduced_mass(all, nodes);
             let speeds = [0, 1].map(|i| before(all, nodes[i]).at(arms[i]));
             let closing = contact.normal.dot(speeds[0] - speeds[1]);
@@ -199,7 +210,7 @@ impl Integrator {
             body.advance(node, twist, scene.settings.dt, scene.state);
             body.impulse =
                 Twist { linear: twist.linear - node.target.linear, angular: twist.angular - node.target.angular };
-            if !body.is_finite(scene.state) {
+            if !body.is_sane(scene.state) {
                 body.quarantined = true;
                 body.set_pose(before, scene.state);
                 body.set_twist(Twist::REST, scene.state);
@@ -208,7 +219,6 @@ impl Integrator {
             }
             report.bodies += 1;
             report.dof += if node.rotates { 6 } else { 3 };
-            (body.force, body.torque) = Default::default();
         }
         for solve in &self.solves[..self.islands.len()] {
             solve.write_back(scene, &mut report);
@@ -224,7 +234,7 @@ impl Solve {
         for (term, &source) in self.problem.terms.contacts.iter().zip(&self.contacts) {
             let contact = &mut scene.contacts[source as usize];
             contact.anchor = finite_or_zero(term.final_anchor(&candidate));
-            contact.normal_force = term.normal_force(&candidate);
+            contact.normal_force = finite_or_zero(DVec3::X * term.normal_force(&candidate)).x;
             report.worst_penetration = report.worst_penetration.max(term.final_depth(&candidate));
         }
         for (term, &id) in self.problem.terms.ball_joints.iter().zip(&self.ball_joints) {
@@ -244,8 +254,8 @@ impl Solve {
 }
 
 /// What a potential remembers must not carry a non-finite number into the next tick.
-fn finite_or_zero(v: glam::DVec3) -> glam::DVec3 {
-    if v.is_finite() { v } else { glam::DVec3::ZERO }
+fn finite_or_zero(v: DVec3) -> DVec3 {
+    if v.is_finite() { v } else { DVec3::ZERO }
 }
 
 /// Indices of a contact's bodies among the active ones, `None` where one of them is absent.
@@ -279,10 +289,19 @@ fn before(nodes: &[Node], node: NodeIndex) -> Twist {
     nodes.get(node as usize).map_or(Twist::REST, |node| node.before)
 }
 
-/// From a body's centre of mass to a point; none for what does not turn.
-fn arm(nodes: &[Node], node: NodeIndex, point: glam::DVec3) -> glam::DVec3 {
-    match nodes.get(node as usize) {
-        Some(body) if body.rotates => point - body.start.position,
-        _ => glam::DVec3::ZERO,
+/// From a body's centre of mass to a contact point; none for what does not turn.
+///
+/// The normal of a surface of revolution passes through its axis, so spin moves no such surface along its normal. Points
+/// found on flat features of the other body can lie beside that plane, by centimetres, and a wheel's spin would drive
+/// them half a metre deep in a tick: such an arm is taken back into the plane.
+fn arm(nodes: &[Node], node: NodeIndex, body: Option<&Body>, contact: &ContactPoint) -> DVec3 {
+    let (Some(node), Some(body)) = (nodes.get(node as usize).filter(|node| node.rotates), body) else {
+        return DVec3::ZERO;
+    };
+    let arm = contact.position - node.start.position;
+    let axis = body.collider.as_ref().and_then(|collider| collider.shape().revolution_axis());
+    match axis.and_then(|axis| (node.start.rotation * axis).cross(contact.normal).try_normalize()) {
+        Some(beside) => arm.reject_from_normalized(beside),
+        None => arm,
     }
 }

@@ -238,3 +238,96 @@ fn add_scaled<const D: usize>(target: &mut Block<D>, source: &Block<6>, factor: 
 pub(super) fn inner<const D: usize>(a: &[Entry<D>], b: &[Entry<D>]) -> f64 {
     a.iter().zip(b).map(|(a, b)| dot(a, b)).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::conjugate_gradient::ConjugateGradient;
+    use super::*;
+
+    const D: usize = 3;
+
+    /// A positive definite system with blocks below the diagonal at `pairs`, sorted by row, and the same one dense.
+    fn system(n: usize, pairs: &[(u32, u32)], numbers: &[f64]) -> (System<D>, Vec<Vec<f64>>) {
+        let mut numbers = numbers.iter().copied().cycle();
+        let mut system = System::<D> { pairs: pairs.to_vec(), ..System::default() };
+        system.rows = vec![0; n + 1];
+        for &(row, column) in pairs {
+            system.columns.push(column);
+            (row as usize + 1..=n).for_each(|i| system.rows[i] += 1);
+        }
+        let mut dense = vec![vec![0.0; D * n]; D * n];
+        for &(row, column) in pairs {
+            let block: Block<D> = std::array::from_fn(|_| std::array::from_fn(|_| numbers.next().unwrap()));
+            for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+                let (p, q) = (D * row as usize + i, D * column as usize + j);
+                (dense[p][q], dense[q][p]) = (block[i][j], block[i][j]);
+            }
+            system.lower.push(block);
+        }
+        for (i, row) in dense.iter_mut().enumerate() {
+            // Diagonally dominant, so positive definite.
+            row[i] = 0.1 + row.iter().map(|x| x.abs()).sum::<f64>();
+        }
+        let diagonal = |i: usize| std::array::from_fn(|p| std::array::from_fn(|q| dense[D * i + p][D * i + q]));
+        system.diagonal = (0..n).map(diagonal).collect();
+        system.factor_diagonal = vec![zero(); n];
+        system.factor_lower = vec![zero(); pairs.len()];
+        system.factorise();
+        (system, dense)
+    }
+
+    fn entries(n: usize) -> Vec<Entry<D>> {
+        (0..n).map(|i| std::array::from_fn(|j| 1.0 + (i * D + j) as f64 * 0.37)).collect()
+    }
+
+    fn dense_product(dense: &[Vec<f64>], x: &[Entry<D>]) -> Vec<f64> {
+        dense.iter().map(|row| row.iter().zip(x.as_flattened()).map(|(a, x)| a * x).sum()).collect()
+    }
+
+    fn largest_difference(a: &[Entry<D>], b: &[f64]) -> f64 {
+        a.as_flattened().iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    proptest! {
+        /// On a tree whose children come before their parents the factorisation is exact.
+        #[test]
+        fn incomplete_factorisation_solves_trees(
+            parents in prop::collection::vec(any::<prop::sample::Index>(), 1..12),
+            numbers in prop::collection::vec(-1.0..1.0f64, 30),
+        ) {
+            let n = parents.len() + 1;
+            let parent = |(child, index): (usize, &prop::sample::Index)| ((child + 1 + index.index(n - child - 1)) as u32, child as u32);
+            let mut pairs: Vec<_> = parents.iter().enumerate().map(parent).collect();
+            pairs.sort_unstable();
+            let (system, dense) = system(n, &pairs, &numbers);
+            let x = entries(n);
+            let mut solved: Vec<Entry<D>> = dense_product(&dense, &x).chunks(D).map(|c| [c[0], c[1], c[2]]).collect();
+            system.precondition(&mut solved);
+            prop_assert!(largest_difference(&solved, x.as_flattened()) < 1e-9);
+            let g: Vec<Entry<D>> = x.iter().map(|e| e.map(|v| -v)).collect();
+            prop_assert_eq!(ConjugateGradient::default().solve(&system, &g, 0.1, &mut Vec::new()), 1);
+        }
+
+        /// The sparse product is the dense one, and conjugate gradients solve what the factorisation only approximates.
+        #[test]
+        fn conjugate_gradients_solve_any_pattern(
+            wanted in prop::collection::btree_set((1u32..8, 0u32..7), 0..20),
+            numbers in prop::collection::vec(-1.0..1.0f64, 40),
+        ) {
+            let n = 8;
+            let pairs: Vec<_> = wanted.into_iter().filter(|(row, column)| column < row).collect();
+            let (system, dense) = system(n, &pairs, &numbers);
+            let x = entries(n);
+            let mut product = vec![[0.0; D]; n];
+            system.multiply(&x, &mut product);
+            prop_assert!(largest_difference(&product, &dense_product(&dense, &x)) < 1e-12);
+            let g: Vec<Entry<D>> = product.iter().map(|e| e.map(|v| -v)).collect();
+            let mut solved = Vec::new();
+            let iterations = ConjugateGradient::default().solve(&system, &g, 1e-9, &mut solved);
+            prop_assert!(iterations <= 6 + (2.0 * 24f64.sqrt()) as usize);
+            prop_assert!(largest_difference(&solved, x.as_flattened()) < 1e-4);
+        }
+    }
+}

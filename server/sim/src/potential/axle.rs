@@ -60,18 +60,28 @@ const BRAKE_GAIN: f64 = 1e4;
 impl AxleControl {
     pub(crate) fn validate(&self) -> Result<(), SimError> {
         require(self.steer.abs() < std::f64::consts::FRAC_PI_2, "steer", self.steer, "-90 to 90 degrees")?;
-        require(true, "drive.target_speed", self.drive.target_speed, "finite")?;
-        require(self.drive.gain >= 0.0, "drive.gain", self.drive.gain, "0 N m s/rad or more")?;
-        require(self.drive.max_torque >= 0.0, "drive.max_torque", self.drive.max_torque, "0 N m or more")?;
-        require(self.brake >= 0.0, "brake", self.brake, "0 N m or more")
+        require(
+            self.drive.target_speed.abs() < 1e9,
+            "drive.target_speed",
+            self.drive.target_speed,
+            "within 1e9 rad/s",
+        )?;
+        require((0.0..1e15).contains(&self.drive.gain), "drive.gain", self.drive.gain, "0 to below 1e15 N m s/rad")?;
+        require(
+            (0.0..1e9).contains(&self.drive.max_torque),
+            "drive.max_torque",
+            self.drive.max_torque,
+            "0 to below 1e9 N m",
+        )?;
+        require((0.0..1e9).contains(&self.brake), "brake", self.brake, "0 to below 1e9 N m")
     }
 }
 
 impl AxleDesc {
     pub(crate) fn validate(&self) -> Result<(), SimError> {
         require_vector(self.hub, "hub")?;
-        require(self.stiffness >= 0.0, "stiffness", self.stiffness, "0 N/m or more")?;
-        require(self.damping >= 0.0, "damping", self.damping, "0 N s/m or more")?;
+        require((0.0..1e15).contains(&self.stiffness), "stiffness", self.stiffness, "0 to below 1e15 N/m")?;
+        require((0.0..1e15).contains(&self.damping), "damping", self.damping, "0 to below 1e15 N s/m")?;
         self.control.validate()
     }
 }

@@ -30,6 +30,8 @@ pub(crate) struct ContactTerm {
     normal: DVec3,
     /// At the start of the tick, m; not deeper than what may be recovered in one.
     start_gap: f64,
+    /// What the start was deeper than that, m.
+    excess_depth: f64,
     /// N/m.
     normal_stiffness: f64,
     /// N/m.
@@ -81,11 +83,13 @@ impl ContactTerm {
         // Stopping what would get so deep takes a depth of overlap / stiffness: that shall not exceed the transition.
         let overlap = closing_speed * dt - point.gap.max(0.0);
         let stiffness = settings.normal_stiffness.max((overlap / settings.transition).min(STIFFEST));
+        let start_gap = point.gap.max(-settings.recovery_speed * dt);
         Self {
             nodes,
             arms,
             normal: point.normal,
-            start_gap: point.gap.max(-settings.recovery_speed * dt),
+            start_gap,
+            excess_depth: start_gap - point.gap,
             normal_stiffness: stiffness * unit,
             tangent_stiffness: settings.tangent_stiffness * unit,
             transition: settings.transition,
@@ -118,7 +122,7 @@ impl ContactTerm {
 
     /// Depth at the candidate state, m; negative where it is open.
     pub fn final_depth(&self, at: &Candidate) -> f64 {
-        self.depth(self.displacement(at))
+        self.depth(self.displacement(at)) + self.excess_depth
     }
 
     /// The anchor for the next tick: the slip, pulled along at the cone.

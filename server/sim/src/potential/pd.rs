@@ -59,16 +59,20 @@ impl PdGains {
         require(frequency > 0.0 && frequency < 1e3, "frequency", frequency, "above 0, below 1000 Hz")?;
         require((0.0..1e3).contains(&damping_ratio), "damping_ratio", damping_ratio, "0 to below 1000")?;
         let omega = std::f64::consts::TAU * frequency;
+        let beat_angle = omega * (1.0 - damping_ratio * damping_ratio).max(0.0).sqrt() * dt;
+        let slow_enough = beat_angle < std::f64::consts::PI;
+        require(slow_enough, "frequency", frequency, "less than half the tick rate, as damped")?;
         let grown = (damping_ratio * omega * dt).exp();
         let beat = if damping_ratio < 1.0 {
-            (omega * (1.0 - damping_ratio * damping_ratio).sqrt() * dt).cos()
+            beat_angle.cos()
         } else {
             (omega * (damping_ratio * damping_ratio - 1.0).sqrt() * dt).cosh()
         };
         let damping = (2.0 * grown * beat - 2.0) / dt;
         let stiffness = (grown * grown - 1.0 - dt * damping) / (dt * dt);
         let reachable = "a frequency and damping ratio that this tick rate can show (damp more, or slow down)";
-        require(damping >= 0.0 && stiffness >= 0.0, "damping gain", damping, reachable)?;
+        require(damping >= 0.0, "damping gain", damping, reachable)?;
+        require(stiffness >= 0.0, "stiffness gain", stiffness, reachable)?;
         Ok(Self { stiffness, damping })
     }
 }
@@ -139,5 +143,6 @@ mod tests {
             assert!((extreme - expected).abs() < 0.003, "{frequency} Hz: {extreme}");
         }
         assert!(PdGains::new(5.0, 0.3, dt).unwrap_err().to_string().contains("damping gain"));
+        assert!(PdGains::new(30.0, 0.5, dt).unwrap_err().to_string().contains("half the tick rate"));
     }
 }

@@ -31,8 +31,8 @@ impl SpringDesc {
         require_vector(self.a.point, "a.point")?;
         require_vector(self.b.point, "b.point")?;
         require(self.rest_length >= 0.0, "rest_length", self.rest_length, "0 m or more")?;
-        require(self.stiffness >= 0.0, "stiffness", self.stiffness, "0 N/m or more")?;
-        require(self.damping >= 0.0, "damping", self.damping, "0 N s/m or more")
+        require((0.0..1e15).contains(&self.stiffness), "stiffness", self.stiffness, "0 to below 1e15 N/m")?;
+        require((0.0..1e15).contains(&self.damping), "damping", self.damping, "0 to below 1e15 N s/m")
     }
 }
 

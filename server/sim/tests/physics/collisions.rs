@@ -155,3 +155,27 @@ fn a_moved_body_forgets_its_contacts() {
     world.integrate();
     assert!(world.velocity(cube).unwrap().y < -9.8 * DT);
 }
+
+/// Extrusion is part of the shape: a rounded cylinder rolls at its outer radius, and an extruded hull rests on it, on the
+/// ground and on static geometry.
+#[test]
+fn a_rolling_wheel_is_a_rounded_cylinder() {
+    let mut world = world();
+    ground(&mut world);
+    let table = Shape::Box { half: DVec3::new(2.0, 0.5, 2.0) };
+    let at = DVec3::new(0.0, 0.5, 20.0);
+    world.add_static(StaticDesc { shape: table, position: at, rotation: DQuat::IDENTITY, friction: 0.5 }).unwrap();
+    let wheel = Shape::Cylinder { half_length: 0.15, radius: 0.4, rounding: 0.05 };
+    let wheel = thrown(&mut world, wheel, 20.0, DVec3::Y * 0.45, DVec3::X * 4.0, DVec3::Z * -10.0);
+    let corners = (0..8).map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) - 0.5);
+    let hull = Shape::Hull { points: corners.map(|corner| corner * 0.6).collect(), radius: 0.1 };
+    let on_ground = body(&mut world, hull.clone(), 10.0, DVec3::new(0.0, 0.5, -5.0), 0.5);
+    let on_table = body(&mut world, hull, 10.0, DVec3::new(0.0, 1.5, 20.0), 0.5);
+    for _ in 0..60 {
+        world.step();
+    }
+    assert!((world.position(wheel).unwrap().y - 0.4).abs() < 3e-3, "{}", world.position(wheel).unwrap());
+    assert!((world.velocity(wheel).unwrap().x - 4.0).abs() < 0.05, "{}", world.velocity(wheel).unwrap());
+    assert!((world.position(on_ground).unwrap().y - 0.4).abs() < 3e-3, "{}", world.position(on_ground).unwrap());
+    assert!((world.position(on_table).unwrap().y - 1.4).abs() < 3e-3, "{}", world.position(on_table).unwrap());
+}

@@ -1,8 +1,8 @@
 //! What must not hurt: bad arguments, stale handles, absurd speeds.
 
 use pita_sim::{
-    Anchor, AxleControl, AxleDesc, BallJointDesc, DQuat, DVec3, ParticleDesc, RigidBodyDesc, Settings, Shape, SimError,
-    SpringDesc, StaticDesc, World,
+    Anchor, AxleControl, AxleDesc, BallJointDesc, Collider, DQuat, DVec3, ParticleDesc, RigidBodyDesc, Settings, Shape,
+    SimError, SpringDesc, StaticDesc, World,
 };
 
 use super::{cube, ground, particle, world};
@@ -18,7 +18,10 @@ fn refused<T>(result: Result<T, SimError>, expected: &str) {
 fn bad_values_are_named() {
     let mut world = world();
     let good = RigidBodyDesc::new(DVec3::ZERO, 1.0, DVec3::ONE);
-    refused(world.add_rigid_body(RigidBodyDesc { mass: 0.0, ..good.clone() }), "mass is 0, allowed is above 0 kg");
+    refused(
+        world.add_rigid_body(RigidBodyDesc { mass: 0.0, ..good.clone() }),
+        "mass is 0, allowed is 1e-6 to below 1e9 kg",
+    );
     refused(world.add_rigid_body(RigidBodyDesc { mass: f64::NAN, ..good.clone() }), "mass is NaN");
     refused(
         world.add_rigid_body(RigidBodyDesc { inertia: DVec3::new(1.0, -1.0, 1.0), ..good.clone() }),
@@ -28,6 +31,9 @@ fn bad_values_are_named() {
     refused(world.add_rigid_body(RigidBodyDesc { velocity: DVec3::X * 1e10, ..good.clone() }), "velocity is 1");
     let rotation = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
     refused(world.add_rigid_body(RigidBodyDesc { rotation, ..good }), "rotation is 0");
+    let collider = Some(Collider::new(Shape::HalfSpace { normal: DVec3::Y }, 0.5));
+    let moving = RigidBodyDesc { collider, ..RigidBodyDesc::new(DVec3::ZERO, 1.0, DVec3::ONE) };
+    refused(world.add_rigid_body(moving), "a half-space cannot move");
     let shape = Shape::Ball { radius: -1.0 };
     let piece = StaticDesc { shape, position: DVec3::ZERO, rotation: DQuat::IDENTITY, friction: 0.5 };
     refused(world.add_static(piece), "radius is -1");
@@ -90,6 +96,58 @@ fn absurd_motion_is_survived() {
     let here = world.position(bystander).unwrap();
     assert!((here - DVec3::new(-50.0, 0.5, 0.0)).length() < 1e-2, "{here}");
     assert!(world.slices().all(|slice| slice.q.iter().chain(slice.v).all(|x| x.is_finite())));
+}
+
+/// A body that is pushed out of all bounds is quarantined alone: what hangs on it and what stands by go on, its forces do
+/// not pile up, and a new pose brings it back.
+#[test]
+fn a_body_out_of_bounds_is_quarantined_alone() {
+    let mut world = world();
+    ground(&mut world);
+    let (bystander, partner) =
+        (cube(&mut world, DVec3::new(-9.0, 0.5, 0.0)), cube(&mut world, DVec3::new(9.0, 0.5, 0.0)));
+    let light = particle(&mut world, DVec3::new(9.0, 3.0, 0.0), DVec3::ZERO, 1e-6);
+    let (a, b) = (Anchor::body(partner, DVec3::ZERO), Anchor::body(light, DVec3::ZERO));
+    world.add_spring(SpringDesc { a, b, rest_length: 2.5, stiffness: 1e-9, damping: 0.0 }).unwrap();
+    world.step();
+    let place = world.position(light).unwrap();
+    for tick in 0..30 {
+        world.apply_force(light, DVec3::Y * 9e8, place).unwrap();
+        let report = world.step();
+        assert_eq!(report.quarantined, usize::from(tick == 0), "tick {tick}");
+    }
+    assert!(world.is_quarantined(light) && world.position(light) == Some(place));
+    for (id, x) in [(bystander, -9.0), (partner, 9.0)] {
+        assert!(!world.is_quarantined(id));
+        assert!((world.position(id).unwrap() - DVec3::new(x, 0.5, 0.0)).length() < 1e-2);
+    }
+    world.set_pose(light, place, DQuat::IDENTITY).unwrap();
+    world.step();
+    assert!(!world.is_quarantined(light) && world.velocity(light).unwrap().length() < 1.0);
+}
+
+/// The report tells the depth that there is, not the part of it that a tick may recover.
+#[test]
+fn deep_overlap_is_reported_in_full() {
+    let mut world = world();
+    ground(&mut world);
+    cube(&mut world, DVec3::Y * -0.3);
+    let depth = world.step().worst_penetration;
+    assert!((0.6..0.81).contains(&depth), "{depth}");
+}
+
+/// What a joint held apart collides again when the joint is gone; a second joint goes on holding it apart.
+#[test]
+fn removed_joints_let_bodies_collide_again() {
+    let mut world = world();
+    let (a, b) = (cube(&mut world, DVec3::ZERO), cube(&mut world, DVec3::X));
+    let desc = BallJointDesc { a: Anchor::body(a, DVec3::X * 0.5), b: Anchor::body(b, DVec3::X * -0.5) };
+    let joints = [world.add_ball_joint(desc).unwrap(), world.add_ball_joint(desc).unwrap()];
+    for (left, expected) in [(joints[0], false), (joints[1], true)] {
+        assert!(world.remove_ball_joint(left));
+        world.step();
+        assert_eq!(world.contacts().count() > 0, expected);
+    }
 }
 
 /// Bodies inside one another are pushed apart at no more than the recovery speed a contact: four of them here.
