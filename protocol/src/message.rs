@@ -472,8 +472,10 @@ pub struct RefusedCounts {
     pub input_malformed: u64,
     /// Inputs with a value that is out of range or not finite.
     pub input_content: u64,
-    /// Inputs that are not authentic: wrong key, wrong epoch, or no such session.
+    /// Inputs with a wrong seal.
     pub input_forged: u64,
+    /// Inputs of no session, or of one that is over: the last words of one that leaves are repeated.
+    pub input_no_session: u64,
     /// Inputs with nothing new in them.
     pub input_stale: u64,
     /// Inputs dropped because too many came between two ticks.

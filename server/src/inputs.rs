@@ -97,7 +97,8 @@ fn count(counters: &Counters, refused: &Refused) {
         Refused::Wire(WireError::TooLong { .. }) => &counters.input_too_long,
         Refused::Wire(WireError::Version { .. }) => &counters.input_version,
         Refused::Wire(WireError::Content { .. }) => &counters.input_content,
-        Refused::Wire(WireError::Forged) | Refused::Session(InputRefusal::NoSession) => &counters.input_forged,
+        Refused::Wire(WireError::Forged) => &counters.input_forged,
+        Refused::Session(InputRefusal::NoSession) => &counters.input_no_session,
         Refused::Wire(WireError::Malformed | WireError::Kind { .. } | WireError::ArenaName) => {
             &counters.input_malformed
         }

@@ -12,7 +12,7 @@ use crate::cli::StatusArgs;
 use crate::report;
 
 /// Longest wait for the answer of a server that accepted the connection.
-const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 /// Longest wait for the connection itself.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(3);
 
@@ -62,7 +62,7 @@ pub fn run(args: &StatusArgs) -> ExitCode {
 /// Asks the server at `endpoint`.
 ///
 /// # Errors
-/// [`StatusError`], within five seconds.
+/// [`StatusError`], within eight seconds.
 pub async fn ask(endpoint: &str) -> Result<Status, StatusError> {
     let no_server = |reason: String| StatusError::NoServer { endpoint: endpoint.to_owned(), reason };
     let config = client_configuration(endpoint).map_err(|error| no_server(error.to_string()))?;

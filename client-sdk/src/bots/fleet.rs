@@ -32,6 +32,8 @@ pub struct FleetSettings {
     pub seed: u64,
     /// As [`SessionBuilder::connect_timeout`](crate::SessionBuilder::connect_timeout).
     pub connect_timeout: Duration,
+    /// As [`SessionBuilder::loss_timeout`](crate::SessionBuilder::loss_timeout).
+    pub loss_timeout: Duration,
 }
 
 impl FleetSettings {
@@ -43,6 +45,7 @@ impl FleetSettings {
             scripts: vec![ScriptKind::Wander],
             seed: 1,
             connect_timeout: Duration::from_secs(5),
+            loss_timeout: Duration::from_secs(3),
         }
     }
 
@@ -168,8 +171,8 @@ async fn connect(settings: FleetSettings, number: usize) -> Result<(usize, Sessi
         Some(arena) => builder.arena(arena),
         None => builder,
     };
-    let session = builder.connect_timeout(settings.connect_timeout).interpolation(None).connect().await?;
-    Ok((number, session))
+    let builder = builder.connect_timeout(settings.connect_timeout).loss_timeout(settings.loss_timeout);
+    Ok((number, builder.interpolation(None).connect().await?))
 }
 
 /// Spreads the bots over a thirtieth of a second by the golden ratio, which stays even however many are added.

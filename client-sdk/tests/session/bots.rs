@@ -1,7 +1,7 @@
 //! A fleet of bots against the fake: they join, send at the tick rate, are counted, and leave.
 
 use std::{
-    collections::HashMap,
+    collections::HashSet,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -20,12 +20,17 @@ use crate::{
 };
 
 fn fleet(server: &FakeServer) -> BotFleet {
-    BotFleet::new(FleetSettings {
+    BotFleet::new(settings(server))
+}
+
+fn settings(server: &FakeServer) -> FleetSettings {
+    FleetSettings {
         arena: Some(fake_server::ARENA.to_owned()),
         scripts: vec![ScriptKind::Circle, ScriptKind::Chase],
         connect_timeout: SOON,
+        loss_timeout: SOON,
         ..FleetSettings::new(&server.endpoint)
-    })
+    }
 }
 
 /// Sends every slot its snapshots, each car `step` m further a tick, until it is aborted.
@@ -39,7 +44,7 @@ pub fn run_world(server: Arc<FakeServer>, slots: u16, step: f32) -> tokio::task:
                 let ack = InputAck { sequence: (tick - 101) as u32, tick };
                 let snapshot = Snapshot { tick, ack, event_sequence: EVENTS_BEFORE, dof };
                 let key = format!("pita/{}/snapshot/{slot}", fake_server::ARENA);
-                server.zenoh.put(key, encode(&snapshot)).await.unwrap();
+                fake_server::put(&server.zenoh, key, encode(&snapshot)).await;
             }
         }
     })
@@ -56,19 +61,21 @@ async fn a_fleet_drives_and_counts() {
 
     let before = fleet.tally();
     let began = Instant::now();
-    let mut inputs: HashMap<u64, u32> = HashMap::new();
-    while began.elapsed() < Duration::from_secs(2) {
-        let newest = *server.input().await.frames.last().unwrap();
-        *inputs.entry(u64::from(newest.sequence)).or_default() += 1;
-    }
-    let interval = fleet.tally().since(&before);
-    assert!(inputs.len() > 30, "{} distinct inputs in two seconds", inputs.len());
+    let mut inputs = HashSet::new();
+    let interval = loop {
+        inputs.insert(server.input().await.frames.last().unwrap().sequence);
+        let interval = fleet.tally().since(&before);
+        let total = interval.total();
+        // 30 cm a tick for about 30 ticks.
+        if inputs.len() > 30 && total.distance_min_m() > 8.0 && total.lateness_us.len() > 90 {
+            break interval;
+        }
+        assert!(began.elapsed() < SOON, "{} distinct inputs, {total:?}", inputs.len());
+    };
     let total = interval.total();
     assert_eq!((total.connected, total.lost.len()), (3, 0));
     assert_eq!(interval.scripts[&ScriptKind::Circle].connected, 2);
-    // 30 cm a tick for about 60 ticks.
-    assert!(total.distance_min_m() > 8.0 && total.distance_mean_m() < 40.0, "{:?}", total.distances_m);
-    assert!(total.lateness_us.len() > 90 && !total.session.latency_us.is_empty());
+    assert!(!total.session.latency_us.is_empty());
 
     let stopping = tokio::spawn(fleet.stop());
     server.all_leave(3).await;
@@ -95,7 +102,7 @@ async fn a_full_server_ends_the_growth_and_keeps_who_is_in() {
 #[tokio::test(flavor = "multi_thread")]
 async fn bots_whose_server_is_silent_are_lost() {
     let server = FakeServer::start().await;
-    let mut fleet = fleet(&server);
+    let mut fleet = BotFleet::new(FleetSettings { loss_timeout: Duration::from_secs(1), ..settings(&server) });
     soon("joining", fleet.add(2)).await.unwrap();
     let gone = async {
         while fleet.running() > 0 {

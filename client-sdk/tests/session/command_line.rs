@@ -56,7 +56,7 @@ async fn says_that_nobody_answers_and_gives_up() {
 async fn a_good_run_succeeds_and_prints_its_figures() {
     let server = Arc::new(FakeServer::start().await);
     let world = run_world(Arc::clone(&server), 3, 0.3);
-    let bots = start(&server.endpoint, &["--count", "3", "--script", "circle,chase", "--seconds", "2"]);
+    let bots = start(&server.endpoint, &["--count", "3", "--script", "circle,chase", "--seconds", "4"]);
     let output = finish(bots).await;
     world.abort();
     assert!(output.status.success(), "{}", said(&output));
@@ -65,11 +65,12 @@ async fn a_good_run_succeeds_and_prints_its_figures() {
     let all = &figures["scripts"]["all"];
     assert_eq!((&all["bots_connected"], &all["bots_lost"]), (&3.into(), &0.into()));
     assert_eq!(figures["scripts"]["circle"]["bots_connected"], 2);
+    // A small part of what four seconds bring on a machine that does nothing else: 36 m, 360 snapshots.
     for (key, least) in [
-        ("distance_min_m", 8.0),
-        ("snapshots_received", 90.0),
-        ("received_bytes_per_s", 1000.0),
-        ("sent_bytes_per_s", 1000.0),
+        ("distance_min_m", 3.0),
+        ("snapshots_received", 30.0),
+        ("received_bytes_per_s", 100.0),
+        ("sent_bytes_per_s", 100.0),
         ("input_to_effect_p50_ms", 0.0),
         ("bots_late_p99_ms", 0.0),
     ] {

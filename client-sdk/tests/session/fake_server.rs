@@ -22,6 +22,7 @@ use pita_protocol::{
 use tokio::sync::{Mutex as AsyncMutex, mpsc};
 use zenoh::{
     Wait,
+    qos::CongestionControl,
     query::{Query, Queryable},
     sample::SampleKind,
 };
@@ -101,7 +102,7 @@ impl FakeServer {
     }
 
     pub async fn put_on_snapshot(&self, bytes: Vec<u8>) {
-        self.zenoh.put(self.keys.snapshot(SLOT), bytes).await.unwrap();
+        put(&self.zenoh, self.keys.snapshot(SLOT), bytes).await;
     }
 
     pub async fn put_event(&self, sequence: u32, event: Event) {
@@ -109,7 +110,7 @@ impl FakeServer {
     }
 
     pub async fn put_on_event(&self, bytes: Vec<u8>) {
-        self.zenoh.put(self.keys.event(), bytes).await.unwrap();
+        put(&self.zenoh, self.keys.event(), bytes).await;
     }
 
     /// The next input, opened as the server would.
@@ -137,6 +138,11 @@ impl FakeServer {
     pub async fn liveliness(&self) -> (String, bool) {
         soon("a liveliness token", async { self.live.lock().await.recv().await }).await.unwrap()
     }
+}
+
+/// Puts `bytes`, and waits where the client's connection takes no more: what a test sends arrives.
+pub async fn put(zenoh: &zenoh::Session, key: String, bytes: Vec<u8>) {
+    zenoh.put(key, bytes).congestion_control(CongestionControl::Block).await.unwrap();
 }
 
 async fn listen() -> (zenoh::Session, String) {

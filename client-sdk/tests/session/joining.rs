@@ -7,7 +7,7 @@ use pita_protocol::{
     PROTOCOL_VERSION, WireError, encode,
     message::{EventMessage, JoinReply, Refusal, Role},
 };
-use zenoh::Wait;
+use zenoh::{Wait, qos::CongestionControl};
 
 use crate::{
     SOON, builder,
@@ -58,7 +58,8 @@ async fn an_event_between_description_and_answer_is_not_lost() {
     let events = std::sync::Arc::clone(&publisher);
     let server = FakeServer::answering(Box::new(move |_| {
         let event = EventMessage { sequence: EVENTS_BEFORE + 1, tick: 100, event: Event::ActorAdded(actor(99)) };
-        events.get().unwrap().put("pita/fake/event", encode(&event)).wait().unwrap();
+        let put = events.get().unwrap().put("pita/fake/event", encode(&event));
+        put.congestion_control(CongestionControl::Block).wait().unwrap();
         Some(accept(SLOT, Role::Player))
     }))
     .await;

@@ -90,11 +90,10 @@ impl Bots {
 /// Runs the bots in this process, until its standard input ends.
 pub fn run(endpoint: &str, count: usize, script: ScriptKind) -> ExitCode {
     let settings = FleetSettings {
-        endpoint: endpoint.to_owned(),
-        arena: None,
         scripts: vec![script],
         seed: SEED,
         connect_timeout: CONNECT_TIMEOUT,
+        ..FleetSettings::new(endpoint)
     };
     let outcome = tokio::runtime::Runtime::new()
         .map_err(|error| format!("no runtime: {error}"))

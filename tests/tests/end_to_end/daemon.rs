@@ -2,28 +2,20 @@
 
 use std::path::Path;
 use std::process::Command;
-use std::time::{Duration, Instant};
 
 use pita_client::SessionEvent;
 use pita_game::Arena;
 use pita_protocol::message::Event;
 use pita_tests::process::Signal;
-use pita_tests::server_process::ServerProcess;
 
 use crate::clients::connect;
 use crate::run::{Ended, free_port, run};
-use crate::{SOON, pita_server, start_server};
-
-/// How soon a started daemon answers. The goal is a second; the rest is for machines with other things to do.
-const ALIVE_WITHIN: Duration = Duration::from_secs(3);
+use crate::{SOON, Server, observe, pita_server, start_server};
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn it_is_alive_within_a_second_of_starting() {
-    let started = Instant::now();
+async fn it_says_how_it_does() {
     let (server, observer) = start_server().await;
     let status = observer.status().await.unwrap();
-    let alive = started.elapsed();
-    assert!(alive < ALIVE_WITHIN, "{alive:?}");
     assert_eq!((status.tick_hz, status.clients), (30, 0), "{status:?}");
     assert!(status.version.contains(env!("CARGO_PKG_VERSION")), "{status:?}");
     server.stop().unwrap_or_else(|error| panic!("{error}"));
@@ -88,9 +80,8 @@ fn check_accepts_the_defaults_from_any_folder() {
 async fn it_runs_in_any_folder_and_at_25_hz() {
     let folder = tempfile::tempdir().unwrap();
     let mut command = pita_server();
-    let server = ServerProcess::start(command.args(["run", "--tick-hz", "25"]).current_dir(folder.path()))
-        .unwrap_or_else(|error| panic!("{error}"));
-    let observer = pita_tests::observer::Observer::connect(&server.endpoint).await.unwrap();
+    let server = Server::start(command.args(["run", "--tick-hz", "25"]).current_dir(folder.path()));
+    let observer = observe(&server).await;
     assert_eq!(observer.status().await.unwrap().tick_hz, 25);
     server.stop().unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "it left files");

@@ -4,14 +4,16 @@
 //! receive workers: without `TCP_LINGER_TIMEOUT=0` in `.cargo/config.toml`, frozen clients stop everybody's input as
 //! soon as their lease ends.
 
-use std::time::{Duration, Instant};
+use std::sync::PoisonError;
+use std::time::Duration;
 
 use pita_client::Session;
 use pita_tests::process::Signal;
+use pita_tests::server_process::ServerProcess;
 use tokio::sync::watch;
 
 use crate::clients::{ahead, bots_process, connect_three, next_snapshot};
-use crate::{await_clients, eventually, start_server};
+use crate::{COMPANY, await_clients, eventually, observe, pita_server};
 
 /// Clients that freeze: more than Zenoh has receive workers.
 const FROZEN: usize = 8;
@@ -29,9 +31,28 @@ const WATCHED_AFTER: Duration = Duration::from_secs(2);
 /// By how many ticks frozen clients may delay the others' inputs.
 const DELAY_TICKS_MAX: u64 = 2;
 
+/// How often the whole is tried: a hiccup of the machine spoils one round, frozen clients that delay others spoil all.
+const ROUNDS: usize = 3;
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn frozen_clients_do_not_delay_the_others() {
-    let (server, observer) = start_server().await;
+    let _alone = COMPANY.write().unwrap_or_else(PoisonError::into_inner);
+    let mut rounds = Vec::new();
+    while rounds.len() < ROUNDS {
+        let (before, during) = freeze_some().await;
+        if during <= before + DELAY_TICKS_MAX {
+            return;
+        }
+        rounds.push((before, during));
+    }
+    panic!("most ticks between inputs, before and while {FROZEN} clients were frozen, round by round: {rounds:?}");
+}
+
+/// The most ticks from one input's effect to the next one's: before some clients freeze, and until all of them are
+/// closed.
+async fn freeze_some() -> (u64, u64) {
+    let server = ServerProcess::start(pita_server().arg("run")).unwrap_or_else(|error| panic!("{error}"));
+    let observer = observe(&server).await;
     let sessions: [Session; HEALTHY] = connect_three(&server.endpoint).await;
     let sockets = server.process.sockets();
     let bots = bots_process(&server.endpoint, FROZEN);
@@ -40,24 +61,15 @@ async fn frozen_clients_do_not_delay_the_others() {
     let before = longest_gaps(&sessions, tokio::time::sleep(WATCHED_BEFORE)).await;
     assert!(server.process.sockets() >= sockets + FROZEN);
     bots.process.signal(Signal::STOP).unwrap();
-    let frozen_at = Instant::now();
-    let mut closed_after = Duration::ZERO;
     let during = longest_gaps(&sessions, async {
         await_clients(&observer, HEALTHY as u32).await;
         eventually("the connections to be closed", async || (server.process.sockets() <= sockets).then_some(())).await;
-        closed_after = frozen_at.elapsed();
         tokio::time::sleep(WATCHED_AFTER).await;
     })
     .await;
-
-    eprintln!("ticks between inputs, before {before:?}, frozen and closed {during:?}; closed after {closed_after:?}");
-    let usual = before.into_iter().max().unwrap_or(1);
-    let worst = during.into_iter().max().unwrap_or(u64::MAX);
-    assert!(
-        worst <= usual + DELAY_TICKS_MAX,
-        "an input was applied every {usual} ticks before, every {worst} ticks while {FROZEN} clients were frozen"
-    );
+    eprintln!("ticks between inputs, before {before:?}, frozen and closed {during:?}");
     server.stop().unwrap_or_else(|error| panic!("{error}"));
+    (before.into_iter().max().unwrap_or(1), during.into_iter().max().unwrap_or(u64::MAX))
 }
 
 /// For each session, the longest run of ticks from one input's effect to the next one's, while `scene` plays. Each sends
