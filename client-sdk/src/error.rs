@@ -51,6 +51,9 @@ pub enum ClientError {
         /// What is wrong with it.
         error: WireError,
     },
+    /// The server let a player in and gave it no vehicle.
+    #[error("the server let a player in without a vehicle: report it to whoever runs the server")]
+    NoActor,
     /// The caller passed a value that the protocol does not allow.
     #[error("{0}")]
     BadArgument(WireError),
@@ -114,7 +117,7 @@ impl ClientError {
     pub fn is_worth_retrying(&self) -> bool {
         match self {
             Self::Unreachable { .. } | Self::NoArena { .. } | Self::Transport { .. } => true,
-            Self::Refused(refusal) => matches!(refusal, Refusal::Closing),
+            Self::Refused(refusal) => matches!(refusal, Refusal::Closing | Refusal::Ended { .. }),
             _ => false,
         }
     }

@@ -11,7 +11,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use pita_protocol::{decode, message::Snapshot};
+use pita_protocol::{
+    decode,
+    message::{JoinAccepted, Snapshot},
+};
 
 use crate::{
     snapshot::ReceivedSnapshot,
@@ -31,6 +34,8 @@ const AHEAD_MAX_S: f64 = 10.0;
 #[derive(Debug)]
 pub struct Inbox {
     began: Instant,
+    /// Of the session; snapshots for another one are not taken.
+    epoch: u32,
     ledger: TickLedger,
     clock: TickClock,
     /// Newest tick that is known, and when it became known.
@@ -46,13 +51,14 @@ pub struct Inbox {
 }
 
 impl Inbox {
-    /// Of a session that began at `now`, when the server was at `tick`; keeps `recent_max` snapshots for interpolation.
-    pub fn new(tick_hz: u16, tick: u64, recent_max: usize, now: Instant) -> Self {
+    /// Of the session that `accepted` began at `now`; keeps `recent_max` snapshots for interpolation.
+    pub fn new(accepted: &JoinAccepted, recent_max: usize, now: Instant) -> Self {
         Self {
             began: now,
+            epoch: accepted.epoch,
             ledger: TickLedger::default(),
-            clock: TickClock::new(tick_hz),
-            newest: (tick, now),
+            clock: TickClock::new(accepted.tick_hz),
+            newest: (accepted.description.tick, now),
             recent: VecDeque::new(),
             recent_max,
             in_flight: VecDeque::new(),
@@ -65,6 +71,10 @@ impl Inbox {
     pub fn take_snapshot(&mut self, bytes: &[u8], now: Instant) -> Option<Arc<ReceivedSnapshot>> {
         self.statistics.received_bytes += bytes.len() as u64;
         let head = match decode::<Snapshot>(bytes) {
+            Ok(head) if head.epoch != self.epoch => {
+                self.statistics.snapshots_foreign += 1;
+                return None;
+            }
             Ok(head) if self.is_plausible(head.tick, now) => head,
             _ => {
                 self.statistics.malformed += 1;
@@ -174,20 +184,50 @@ impl Inbox {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pita_protocol::{encode, message::InputAck};
+    use pita_protocol::{
+        encode,
+        message::{Description, InputAck},
+        seal::SessionKey,
+    };
     use proptest::prelude::*;
+
+    const EPOCH: u32 = 9;
 
     const PERIOD: Duration = Duration::from_millis(33);
 
+    /// Of a session that began at `tick`.
+    fn inbox(tick: u64, recent_max: usize, now: Instant) -> Inbox {
+        let description = Description {
+            arena: String::new(),
+            title: String::new(),
+            tick,
+            event_sequence: 0,
+            gravity: [0.0; 3],
+            statics: Vec::new(),
+            actors: Vec::new(),
+        };
+        let session_key = SessionKey([0; 32]);
+        let accepted = JoinAccepted {
+            slot: 0,
+            epoch: EPOCH,
+            session_key,
+            tick_hz: 30,
+            input_timeout_ms: 5000,
+            actor: None,
+            description,
+        };
+        Inbox::new(&accepted, recent_max, now)
+    }
+
     fn message(tick: u64, ack: u32) -> Vec<u8> {
         let ack = InputAck { sequence: ack, tick };
-        encode(&Snapshot { tick, ack, event_sequence: 0, dof: Vec::new() })
+        encode(&Snapshot { epoch: EPOCH, tick, ack, event_sequence: 0, dof: Vec::new() })
     }
 
     #[test]
     fn only_the_newest_is_answered_and_every_head_counts() {
         let now = Instant::now();
-        let mut inbox = Inbox::new(30, 100, 4, now);
+        let mut inbox = inbox(100, 4, now);
         let answered = [101, 103, 102, 103, 104].map(|t| inbox.take_snapshot(&message(t, 0), now).map(|s| s.tick()));
         assert_eq!(answered, [Some(101), Some(103), None, None, Some(104)]);
         let counts = inbox.statistics();
@@ -199,7 +239,7 @@ mod tests {
     #[test]
     fn latency_runs_from_the_send_to_the_first_acknowledging_snapshot() {
         let start = Instant::now();
-        let mut inbox = Inbox::new(30, 0, 0, start);
+        let mut inbox = inbox(0, 0, start);
         for sequence in 1..=3 {
             inbox.note_sent(sequence, 50, start + PERIOD * sequence);
         }
@@ -215,7 +255,7 @@ mod tests {
     #[test]
     fn a_tick_that_cannot_be_is_malformed_and_hides_nothing() {
         let now = Instant::now();
-        let mut inbox = Inbox::new(30, 100, 0, now);
+        let mut inbox = inbox(100, 0, now);
         assert!(inbox.take_snapshot(&message(u64::MAX, 0), now).is_none());
         assert!(inbox.take_snapshot(&message(101, 0), now).is_some());
         assert_eq!(inbox.statistics().malformed, 1);
@@ -230,7 +270,7 @@ mod tests {
             acks in prop::collection::vec((any::<u64>(), any::<u32>()), 0..20),
         ) {
             let now = Instant::now();
-            let mut inbox = Inbox::new(30, 0, 2, now);
+            let mut inbox = inbox(0, 2, now);
             for bytes in messages {
                 inbox.take_snapshot(&[&[1, 5][..], &bytes].concat(), now);
             }
@@ -243,7 +283,7 @@ mod tests {
         #[test]
         fn memory_is_bounded(count in 1u64..600) {
             let now = Instant::now();
-            let mut inbox = Inbox::new(30, 0, 3, now);
+            let mut inbox = inbox(0, 3, now);
             for tick in 1..=count {
                 inbox.note_sent(tick as u32, 1, now);
                 inbox.take_snapshot(&message(tick, 0), now);

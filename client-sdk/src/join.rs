@@ -58,6 +58,7 @@ pub async fn join(
         zenoh: zenoh.clone(),
         keys,
         slot: accepted.slot,
+        actor: accepted.actor,
         joined_at: accepted.description.event_sequence,
         loss_timeout: wanted.loss_timeout,
         keep_alive: silent_otherwise.then(|| Duration::from_millis(accepted.input_timeout_ms.into()) / 3),

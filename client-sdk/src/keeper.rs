@@ -42,6 +42,8 @@ pub struct Keeper {
     pub zenoh: zenoh::Session,
     pub keys: Keys,
     pub slot: u16,
+    /// The session's own actor.
+    pub actor: Option<u32>,
     /// Number of the last event before the session.
     pub joined_at: u32,
     pub loss_timeout: Duration,
@@ -58,6 +60,7 @@ impl Keeper {
         checks.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
         let mut sent = Instant::now();
         let mut announced = 0;
+        let mut is_bereft = false;
         while self.shared.end().is_none() {
             tokio::select! {
                 arrived = events.recv() => match arrived {
@@ -66,6 +69,7 @@ impl Keeper {
                 },
                 _ = checks.tick() => {
                     self.check(&mut announced).await;
+                    self.check_actor(&mut is_bereft);
                     if self.keep_alive.is_some_and(|period| sent.elapsed() >= period) {
                         sent = Instant::now();
                         let _ = self.wire.send(Controls::default(), false).await;
@@ -115,6 +119,16 @@ impl Keeper {
             self.reconcile().await;
         }
         *announced = self.shared.newest().map_or(0, |snapshot| snapshot.event_sequence());
+    }
+
+    /// Ends a session whose own actor is gone: events that told why are lost. One check later than it is noticed, because
+    /// the word on the session follows that on its actor.
+    fn check_actor(&self, is_bereft: &mut bool) {
+        let is_gone = self.actor.is_some_and(|actor| self.shared.roster().actor(actor).is_none());
+        if is_gone && *is_bereft {
+            self.shared.finish(SessionEnd::Removed { reason: "its actor was taken out".to_owned() });
+        }
+        *is_bereft = is_gone;
     }
 
     async fn reconcile(&self) {

@@ -33,11 +33,10 @@ pub struct Shared {
 
 impl Shared {
     pub fn new(accepted: &JoinAccepted, recent_max: usize, interpolation: Option<Interpolation>) -> Self {
-        let description = &accepted.description;
         Self {
-            inbox: Mutex::new(Inbox::new(accepted.tick_hz, description.tick, recent_max, Instant::now())),
+            inbox: Mutex::new(Inbox::new(accepted, recent_max, Instant::now())),
             events: EventQueue::default(),
-            roster: Mutex::new(Arc::new(Roster::new(description))),
+            roster: Mutex::new(Arc::new(Roster::new(&accepted.description))),
             newest: watch::Sender::new(None),
             end: watch::Sender::new(None),
             interpolation,

@@ -96,7 +96,7 @@ mod tests {
     use pita_protocol::slices::{KIND_PARTICLE, pack};
 
     fn received(dof: Vec<u8>) -> ReceivedSnapshot {
-        let head = Snapshot { tick: 1, ack: InputAck::default(), event_sequence: 0, dof };
+        let head = Snapshot { epoch: 0, tick: 1, ack: InputAck::default(), event_sequence: 0, dof };
         ReceivedSnapshot::new(head, Instant::now(), Arc::default())
     }
 

@@ -25,6 +25,8 @@ pub struct Statistics {
     pub snapshots_missed: u64,
     /// Snapshots that were repeated or too old to be of use.
     pub snapshots_stale: u64,
+    /// Snapshots for another session of the same slot.
+    pub snapshots_foreign: u64,
     /// Events that were new.
     pub events_received: u64,
     /// Events that were announced and did not arrive; the roster was read again after each gap.
@@ -47,6 +49,7 @@ impl Default for Statistics {
             snapshots_received: 0,
             snapshots_missed: 0,
             snapshots_stale: 0,
+            snapshots_foreign: 0,
             events_received: 0,
             events_missed: 0,
             malformed: 0,
@@ -79,11 +82,12 @@ impl Statistics {
         let _ = self.latency_us.add(&other.latency_us);
     }
 
-    fn counts(&mut self) -> [&mut u64; 9] {
+    fn counts(&mut self) -> [&mut u64; 10] {
         [
             &mut self.snapshots_received,
             &mut self.snapshots_missed,
             &mut self.snapshots_stale,
+            &mut self.snapshots_foreign,
             &mut self.events_received,
             &mut self.events_missed,
             &mut self.malformed,

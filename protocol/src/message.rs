@@ -76,6 +76,12 @@ pub enum Refusal {
     /// The server is about to end.
     #[error("the server is closing")]
     Closing,
+    /// The session ended before it was let in.
+    #[error("the session ended before it began ({reason}): try again")]
+    Ended {
+        /// For a person, as in [`Event::Left`].
+        reason: String,
+    },
 }
 
 /// A session.
@@ -328,6 +334,8 @@ pub struct InputAck {
 /// Put on [`snapshot`](crate::Keys::snapshot) after each tick.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Snapshot {
+    /// [`JoinAccepted::epoch`] of the session that it is for: the slot's last or next session is none of its business.
+    pub epoch: u32,
     /// Tick whose end this is; gaps in it are lost snapshots.
     pub tick: u64,
     /// Inputs of the session that this snapshot is for.
@@ -464,6 +472,8 @@ pub struct RefusedCounts {
     pub join_malformed: u64,
     /// Joins for which there was no slot.
     pub join_full: u64,
+    /// Joins of which the session ended before it was let in.
+    pub join_ended: u64,
     /// Inputs longer than allowed.
     pub input_too_long: u64,
     /// Inputs of another protocol version.
@@ -603,7 +613,7 @@ mod tests {
     fn messages_round_trip() {
         assert_eq!(decode(&encode(&join("Wu"))), Ok(join("Wu")));
         assert_eq!(decode(&encode(&packet(0.5))), Ok(packet(0.5)));
-        let snapshot = Snapshot { tick: 1, ack: InputAck::default(), event_sequence: 2, dof: vec![1, 2, 3] };
+        let snapshot = Snapshot { epoch: 9, tick: 1, ack: InputAck::default(), event_sequence: 2, dof: vec![1, 2, 3] };
         assert_eq!(decode(&encode(&snapshot)), Ok(snapshot));
     }
 
@@ -647,7 +657,7 @@ mod tests {
     #[test]
     fn nine_bytes_cannot_claim_all_memory() {
         // Version, kind, then the marker and value of a length of 2^63.
-        let mut bomb = vec![1, Snapshot::KIND, 0, 0, 0, 0, 253];
+        let mut bomb = vec![1, Snapshot::KIND, 0, 0, 0, 0, 0, 253];
         bomb.extend_from_slice(&(1u64 << 63).to_le_bytes());
         assert_eq!(decode::<Snapshot>(&bomb), Err(WireError::Malformed));
     }

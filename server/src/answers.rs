@@ -9,14 +9,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
 
-use pita_protocol::message::{Description, JoinAccepted, JoinReply, JoinRequest, Refusal, TicksRequest};
+use pita_protocol::message::{Description, JoinAccepted, JoinReply, JoinRequest, Refusal, Role, TicksRequest};
 use pita_protocol::seal::SessionKey;
 use pita_protocol::{Message, PROTOCOL_VERSION, WireError};
 use zenoh::Wait;
 use zenoh::query::Query;
 
 use crate::metrics;
-use crate::sessions::{JoinRefusal, SessionId};
+use crate::sessions::{EndReason, JoinRefusal, Secrets, SessionId};
 use crate::shared::Shared;
 
 /// Most queries that wait; further ones are dropped, and their askers time out.
@@ -48,8 +48,8 @@ pub enum Work {
         /// The world, the actor in it.
         description: Arc<Description>,
     },
-    /// The session is over; if its join still waits, it is refused.
-    Ended(SessionId),
+    /// The session is over, and why; if its join still waits, it is refused.
+    Ended(SessionId, EndReason),
     /// Refuses what waits and ends the thread.
     Stop,
 }
@@ -57,6 +57,7 @@ pub enum Work {
 /// The way into the thread's queue. Never waits.
 #[derive(Clone)]
 pub struct Asker {
+    shared: Arc<Shared>,
     work: Sender<Work>,
     queries: Arc<AtomicUsize>,
 }
@@ -66,6 +67,7 @@ impl Asker {
     pub fn ask(&self, question: Question, query: Query) {
         if self.queries.fetch_add(1, Ordering::Relaxed) >= QUERIES_MAX {
             self.queries.fetch_sub(1, Ordering::Relaxed);
+            self.shared.counters.queries_dropped.add(1);
             return;
         }
         self.tell(Work::Answer(question, query));
@@ -92,7 +94,7 @@ impl Answering {
     pub fn new(shared: Arc<Shared>) -> (Self, Asker) {
         let (sender, work) = mpsc::channel();
         let queries = Arc::new(AtomicUsize::new(0));
-        let asker = Asker { work: sender, queries: queries.clone() };
+        let asker = Asker { shared: shared.clone(), work: sender, queries: queries.clone() };
         (Self { shared, work, queries, pending: HashMap::new() }, asker)
     }
 
@@ -105,7 +107,7 @@ impl Answering {
                     self.answer(question, query);
                 }
                 Work::Admitted { id, actor, description } => self.accept(id, actor, &description),
-                Work::Ended(id) => self.refuse_pending(id),
+                Work::Ended(id, reason) => self.refuse_pending(id, reason),
                 Work::Stop => break,
             }
         }
@@ -141,16 +143,22 @@ impl Answering {
                 self.shared.wake_publisher();
             }
             Err(refusal) => {
-                let counters = &self.shared.counters;
-                match &refusal {
-                    Refusal::Version { .. } => counters.join_version.add(1),
-                    Refusal::Malformed(_) => counters.join_malformed.add(1),
-                    Refusal::Full { .. } => counters.join_full.add(1),
-                    Refusal::Closing => {}
-                }
-                reply(&self.shared, &query, self.shared.keys.join(), &JoinReply::Refused(refusal));
+                self.refuse(&query, refusal);
             }
         }
+    }
+
+    /// Says why there is no session, and counts it.
+    fn refuse(&self, query: &Query, refusal: Refusal) {
+        let counters = &self.shared.counters;
+        match &refusal {
+            Refusal::Version { .. } => counters.join_version.add(1),
+            Refusal::Malformed(_) => counters.join_malformed.add(1),
+            Refusal::Full { .. } => counters.join_full.add(1),
+            Refusal::Ended { .. } => counters.join_ended.add(1),
+            Refusal::Closing => {}
+        }
+        reply(&self.shared, query, self.shared.keys.join(), &JoinReply::Refused(refusal));
     }
 
     /// Begins the session that `query` asks for.
@@ -159,12 +167,13 @@ impl Answering {
             WireError::Version { theirs } => Refusal::Version { server: PROTOCOL_VERSION, client: theirs },
             other => Refusal::Malformed(other.to_string()),
         })?;
-        let key = new_key().map_err(|error| {
+        let secrets = new_secrets().map_err(|error| {
             tracing::error!("no randomness from the operating system: {error}");
             Refusal::Closing
         })?;
         let mut sessions = self.shared.sessions();
-        let joined = sessions.join(&request.name, request.role, key.clone(), self.shared.clock.ms());
+        let key = secrets.key.clone();
+        let joined = sessions.join(&request.name, request.role, secrets, self.shared.clock.ms());
         let id = joined.map_err(|refusal| match refusal {
             JoinRefusal::Full => Refusal::Full { slots: sessions.slots_of(request.role) },
             JoinRefusal::Closing => Refusal::Closing,
@@ -186,20 +195,25 @@ impl Answering {
         reply(&self.shared, &query, self.shared.keys.join(), &JoinReply::Accepted(Box::new(accepted)));
     }
 
-    fn refuse_pending(&mut self, id: SessionId) {
+    fn refuse_pending(&mut self, id: SessionId, reason: EndReason) {
         let Some((query, _)) = self.pending.remove(&id) else { return };
-        self.shared.counters.join_full.add(1);
-        let slots = self.shared.sessions().slots();
-        reply(&self.shared, &query, self.shared.keys.join(), &JoinReply::Refused(Refusal::Full { slots }));
+        let refusal = match reason {
+            // Only players need a place in the arena.
+            EndReason::NoPlace => Refusal::Full { slots: self.shared.sessions().slots_of(Role::Player) },
+            EndReason::Left | EndReason::ConnectionLost | EndReason::Silent { .. } => {
+                Refusal::Ended { reason: reason.to_string() }
+            }
+        };
+        self.refuse(&query, refusal);
     }
 }
 
-/// A secret from the operating system.
-fn new_key() -> Result<SessionKey, rand::rngs::SysError> {
+/// Secrets from the operating system.
+fn new_secrets() -> Result<Secrets, rand::rngs::SysError> {
     use rand::TryRng;
-    let mut secret = [0; 32];
-    rand::rngs::SysRng.try_fill_bytes(&mut secret)?;
-    Ok(SessionKey(secret))
+    let mut key = [0; 32];
+    rand::rngs::SysRng.try_fill_bytes(&mut key)?;
+    Ok(Secrets { epoch: rand::rngs::SysRng.try_next_u32()?, key: SessionKey(key) })
 }
 
 /// Decodes what `query` carries; nothing at all is malformed.

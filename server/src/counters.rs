@@ -28,9 +28,14 @@ pub struct Counters {
     pub sent_bytes: Counter,
     /// Payload of inputs and queries received, bytes.
     pub received_bytes: Counter,
+    /// Queries that found the queue full.
+    pub queries_dropped: Counter,
+    /// Frames that were not published, because a newer one waited already.
+    pub frames_superseded: Counter,
     pub join_version: Counter,
     pub join_malformed: Counter,
     pub join_full: Counter,
+    pub join_ended: Counter,
     pub input_too_long: Counter,
     pub input_version: Counter,
     pub input_malformed: Counter,
@@ -49,6 +54,7 @@ impl Counters {
             join_version: self.join_version.get(),
             join_malformed: self.join_malformed.get(),
             join_full: self.join_full.get(),
+            join_ended: self.join_ended.get(),
             input_too_long: self.input_too_long.get(),
             input_version: self.input_version.get(),
             input_malformed: self.input_malformed.get(),

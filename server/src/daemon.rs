@@ -10,12 +10,14 @@ use std::time::Duration;
 use pita_game::{Arena, ArenaSettings};
 use pita_protocol::Keys;
 use tokio::signal::unix::{Signal, SignalKind, signal};
+use tokio::sync::oneshot;
 
 use crate::arena_source::{self, SourceError};
 use crate::cli::RunArgs;
 use crate::config::{ConfigError, ServerConfig};
-use crate::frame::Totals;
 use crate::network::{self, NetworkError};
+use crate::output::Output;
+use crate::report::Troubles;
 use crate::sessions::{Limits, Sessions};
 use crate::shared::{Phase, Shared, Start};
 use crate::stopwatch::Clock;
@@ -71,11 +73,19 @@ impl From<zenoh::Error> for DaemonError {
 /// Runs the daemon until a signal ends it; exit code 0 then.
 pub fn run(args: &RunArgs) -> ExitCode {
     let clock = Clock::start();
-    init_logging();
-    match configure(args).and_then(|(config, arena)| run_arena(&config, arena, clock)) {
+    match start(args, clock) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => report::failure(&error.to_string()),
     }
+}
+
+fn start(args: &RunArgs, clock: Clock) -> Result<(), DaemonError> {
+    let (out, log) = (Output::to(std::io::stdout())?, Output::to(std::io::stderr())?);
+    init_logging(log.clone());
+    let ended = configure(args).and_then(|(config, arena)| run_arena(&config, arena, clock, &out));
+    out.flush();
+    log.flush();
+    ended
 }
 
 /// Reads configuration and arena; arguments come before the file.
@@ -98,16 +108,16 @@ fn configure(args: &RunArgs) -> Result<(ServerConfig, Arena), DaemonError> {
     Ok((config, arena))
 }
 
-fn run_arena(config: &ServerConfig, arena: Arena, clock: Clock) -> Result<(), DaemonError> {
+fn run_arena(config: &ServerConfig, arena: Arena, clock: Clock, out: &Output) -> Result<(), DaemonError> {
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(RUNTIME_THREADS).enable_all().build()?;
     runtime.block_on(async {
         // Before anything that has to be ended in order.
-        let signals = Signals::new()?;
+        let ending = watch_signals(Signals::new()?);
         let shared = Arc::new(share(config, &arena, clock)?);
         let (session, endpoint) = network::open(&config.network, &shared.keys).await?;
         let mut serving = Serving::start(config, arena, &shared, session)?;
-        report::print(&report::welcome(&endpoint, &metrics::status(&shared)));
-        let ended = watch(config, &shared, &mut serving, signals).await;
+        out.print(&report::welcome(&endpoint, &metrics::status(&shared)));
+        let ended = watch(config, &shared, &mut serving, ending, out).await;
         say_farewell(&shared).await;
         serving.stop(&shared).await;
         ended
@@ -141,30 +151,41 @@ async fn watch(
     config: &ServerConfig,
     shared: &Shared,
     serving: &mut Serving,
-    mut signals: Signals,
+    mut ending: oneshot::Receiver<()>,
+    out: &Output,
 ) -> Result<(), DaemonError> {
     let period = Duration::from_secs(config.report.status_line_s.get().into());
     let mut lines = tokio::time::interval_at(tokio::time::Instant::now() + period, period);
     lines.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-    let mut totals = Totals::default();
+    let mut told = Troubles::default();
     loop {
         tokio::select! {
             _ = lines.tick() => {
-                report::print(&report::status_line(&metrics::status(shared)));
-                let now = shared.metrics().totals();
-                report::trouble(&totals, &now, config.tick.when_behind).iter().for_each(|line| report::print(line));
-                totals = now;
+                out.print(&report::status_line(&metrics::status(shared)));
+                let now = Troubles::of(shared);
+                report::trouble(&told, &now, config.tick.when_behind).iter().for_each(|line| out.print(line));
+                told = now;
             }
             name = serving.thread_ended() => return Err(DaemonError::ThreadEnded(name)),
-            () = signals.next() => break,
+            // An error would be the end of the task that watches, which ends with the process only.
+            _ = &mut ending => break,
         }
     }
-    report::print("Ending: clients are told. Another Ctrl-C ends at once.");
+    out.print("Ending: clients are told. Another Ctrl-C ends at once.");
+    Ok(())
+}
+
+/// Tells of the first signal; the second one ends the process, whatever the rest of it is at.
+fn watch_signals(mut signals: Signals) -> oneshot::Receiver<()> {
+    let (first, ending) = oneshot::channel();
     tokio::spawn(async move {
+        signals.next().await;
+        // Where nobody waits for it, the daemon ends already.
+        let _ = first.send(());
         signals.next().await;
         std::process::exit(130);
     });
-    Ok(())
+    ending
 }
 
 /// Tells clients that the server ends, and gives them a moment to leave.
@@ -201,11 +222,11 @@ impl Signals {
 }
 
 /// Logs go to stderr; `RUST_LOG` chooses which.
-fn init_logging() {
+fn init_logging(log: Output) {
     use tracing_subscriber::EnvFilter;
     let filter =
         EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn,zenoh=error,pita_server=info"));
     // Fails only where the process logs already, which is as good.
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(move || log.clone());
     let _ = log.with_ansi(std::io::stderr().is_terminal()).try_init();
 }

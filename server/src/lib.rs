@@ -27,6 +27,7 @@ pub mod frame;
 pub mod inputs;
 pub mod metrics;
 pub mod network;
+pub mod output;
 pub mod pacer;
 pub mod publish;
 pub mod report;

@@ -60,7 +60,7 @@ impl Publishing {
             boarding: VecDeque::new(),
             changes: Vec::new(),
             tick: 0,
-            snapshot: Snapshot { tick: 0, ack: InputAck::default(), event_sequence: 0, dof: Vec::new() },
+            snapshot: Snapshot { epoch: 0, tick: 0, ack: InputAck::default(), event_sequence: 0, dof: Vec::new() },
             has_said_closing: false,
         })
     }
@@ -122,7 +122,7 @@ impl Publishing {
 
     fn end_session(&mut self, id: SessionId, role: Role, reason: EndReason) {
         self.outlets.remove(&id.slot);
-        self.asker.tell(Work::Ended(id));
+        self.asker.tell(Work::Ended(id, reason));
         tracing::info!("slot {}: ended, {reason}", id.slot);
         let (slot, text) = (id.slot, reason.to_string());
         match (role, reason) {
@@ -156,6 +156,8 @@ impl Publishing {
             }
             if self.shared.frames.is_drained() {
                 self.publish_snapshots(&mut frame);
+            } else {
+                self.shared.counters.frames_superseded.add(1);
             }
             self.measure(&frame);
             self.shared.frames.put_free(frame);
@@ -204,6 +206,7 @@ impl Publishing {
             // Acknowledgements are in order of slot.
             let found = frame.acks.binary_search_by_key(&id.slot, |(acked, _)| acked.slot).map(|at| frame.acks[at]);
             self.snapshot.ack = found.ok().filter(|(acked, _)| acked == id).map(|(_, ack)| ack).unwrap_or_default();
+            self.snapshot.epoch = id.epoch;
             let bytes = pita_protocol::encode(&self.snapshot);
             self.shared.counters.sent_bytes.add(bytes.len() as u64);
             outlet.put(bytes);

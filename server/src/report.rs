@@ -7,6 +7,7 @@ use pita_protocol::message::Status;
 
 use crate::config::WhenBehind;
 use crate::frame::Totals;
+use crate::shared::Shared;
 
 /// Prints `text` and a line end on stdout at once. Where stdout is closed, nobody reads it and the program goes on.
 pub fn print(text: &str) {
@@ -61,9 +62,36 @@ pub fn status_line(status: &Status) -> String {
     )
 }
 
-/// What is said about trouble since `before`, a line each; nothing where there was none.
-pub fn trouble(before: &Totals, now: &Totals, when_behind: WhenBehind) -> Vec<String> {
+/// What went wrong since the start, of all that is told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Troubles {
+    /// Of the ticks.
+    pub totals: Totals,
+    /// Frames that were not published, because a newer one waited already.
+    pub frames_superseded: u64,
+    /// Queries that were not answered, because too many waited.
+    pub queries_dropped: u64,
+}
+
+impl Troubles {
+    /// As of now.
+    pub fn of(shared: &Shared) -> Self {
+        Self {
+            totals: shared.metrics().totals(),
+            frames_superseded: shared.counters.frames_superseded.get(),
+            queries_dropped: shared.counters.queries_dropped.get(),
+        }
+    }
+
+    fn unpublished(&self) -> u64 {
+        self.totals.frames_missed + self.frames_superseded
+    }
+}
+
+/// What is said about trouble since `earlier`, a line each; nothing where there was none.
+pub fn trouble(earlier: &Troubles, latest: &Troubles, when_behind: WhenBehind) -> Vec<String> {
     let mut lines = Vec::new();
+    let (before, now) = (&earlier.totals, &latest.totals);
     let overruns = now.overruns - before.overruns;
     let lost_ms = (now.given_up_ns - before.given_up_ns) / 1_000_000;
     let skipped = now.skipped_ticks - before.skipped_ticks;
@@ -76,9 +104,13 @@ pub fn trouble(before: &Totals, now: &Totals, when_behind: WhenBehind) -> Vec<St
             "behind: {overruns} ticks took longer than their period, {done}, the world fell {lost_ms} ms behind the clock"
         ));
     }
-    let unpublished = now.frames_missed - before.frames_missed;
+    let unpublished = latest.unpublished() - earlier.unpublished();
     if unpublished > 0 {
         lines.push(format!("behind: {unpublished} ticks were not published, because publishing did not keep up"));
+    }
+    let dropped = latest.queries_dropped - earlier.queries_dropped;
+    if dropped > 0 {
+        lines.push(format!("behind: {dropped} queries were not answered, because too many waited"));
     }
     let quarantined = now.quarantined - before.quarantined;
     if quarantined > 0 {
@@ -93,13 +125,17 @@ mod tests {
 
     #[test]
     fn only_new_trouble_is_told() {
-        let before = Totals { overruns: 5, given_up_ns: 7_000_000, ..Totals::default() };
+        let ticks = Totals { overruns: 5, given_up_ns: 7_000_000, ..Totals::default() };
+        let before = Troubles { totals: ticks, queries_dropped: 3, ..Troubles::default() };
         assert_eq!(trouble(&before, &before, WhenBehind::SlowDown), Vec::<String>::new());
-        let now = Totals { overruns: 7, given_up_ns: 90_000_000, frames_missed: 4, quarantined: 1, ..before };
+        let totals = Totals { overruns: 7, given_up_ns: 90_000_000, frames_missed: 4, quarantined: 1, ..ticks };
+        let now = Troubles { totals, frames_superseded: 2, queries_dropped: 8 };
         let lines = trouble(&before, &now, WhenBehind::SlowDown);
-        assert_eq!(lines.len(), 3);
+        assert_eq!(lines.len(), 4);
+        assert!(lines[1].contains("6 ticks were not published") && lines[2].contains("5 queries"), "{lines:?}");
         assert!(lines[0].contains("2 ticks") && lines[0].contains("83 ms"), "{lines:?}");
-        let skipping = trouble(&before, &Totals { skipped_ticks: 3, ..before }, WhenBehind::Skip);
+        let skipping =
+            trouble(&before, &Troubles { totals: Totals { skipped_ticks: 3, ..ticks }, ..before }, WhenBehind::Skip);
         assert!(skipping[0].contains("3 ticks were left out"), "{skipping:?}");
     }
 

@@ -20,13 +20,22 @@ pub struct Limits {
     pub input_packets_per_tick: u32,
 }
 
-/// One session, named for good: a slot is used again, a pair of slot and epoch is not.
+/// One session, named for good: a slot is used again, a pair of slot and epoch is not, as far as chance goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SessionId {
     /// Number of the place.
     pub slot: u16,
     /// Tells the sessions of one slot apart.
     pub epoch: u32,
+}
+
+/// What is random about a session, drawn by whoever begins it.
+#[derive(Clone, Debug)]
+pub struct Secrets {
+    /// Becomes [`SessionId::epoch`]: nobody guesses it and takes the session's liveliness token for it.
+    pub epoch: u32,
+    /// Seals its inputs.
+    pub key: SessionKey,
 }
 
 /// Why a session ended; its text is for a person.
@@ -109,7 +118,6 @@ pub enum InputRefusal {
 pub struct Sessions {
     limits: Limits,
     slots: Vec<Slot>,
-    next_epoch: u32,
     closing: bool,
     changes: Vec<Change>,
 }
@@ -126,7 +134,6 @@ struct Session {
     key: SessionKey,
     role: Role,
     heard_ms: u64,
-    has_shown_token: bool,
     last_sequence: u32,
     packets_tick: u64,
     packets: u32,
@@ -145,14 +152,14 @@ impl Sessions {
     /// Empty slots.
     pub fn new(limits: Limits) -> Self {
         let slots = (0..limits.players + limits.spectators).map(|_| Slot::Free).collect();
-        Self { limits, slots, next_epoch: 1, closing: false, changes: Vec::new() }
+        Self { limits, slots, closing: false, changes: Vec::new() }
     }
 
-    /// Begins a session on the lowest free slot of its role; `key` will seal its inputs.
+    /// Begins a session on the lowest free slot of its role.
     ///
     /// # Errors
     /// [`JoinRefusal`].
-    pub fn join(&mut self, name: &str, role: Role, key: SessionKey, now_ms: u64) -> Result<SessionId, JoinRefusal> {
+    pub fn join(&mut self, name: &str, role: Role, secrets: Secrets, now_ms: u64) -> Result<SessionId, JoinRefusal> {
         if self.closing {
             return Err(JoinRefusal::Closing);
         }
@@ -162,14 +169,12 @@ impl Sessions {
         };
         let is_free = |slot: &u16| matches!(self.slots[usize::from(*slot)], Slot::Free);
         let slot = slots.into_iter().find(is_free).ok_or(JoinRefusal::Full)?;
-        let id = SessionId { slot, epoch: self.next_epoch };
-        self.next_epoch = self.next_epoch.wrapping_add(1);
+        let id = SessionId { slot, epoch: secrets.epoch };
         self.slots[usize::from(slot)] = Slot::Taken(Session {
             epoch: id.epoch,
-            key,
+            key: secrets.key,
             role,
             heard_ms: now_ms,
-            has_shown_token: false,
             last_sequence: 0,
             packets_tick: 0,
             packets: 0,
@@ -223,13 +228,6 @@ impl Sessions {
         Ok(Received::Input { sequence: newest.sequence, controls })
     }
 
-    /// The session's liveliness token has been seen.
-    pub fn token_appeared(&mut self, id: SessionId) {
-        if let Some(session) = self.session_mut(id) {
-            session.has_shown_token = true;
-        }
-    }
-
     /// The session's liveliness token is gone: ends it.
     pub fn token_disappeared(&mut self, id: SessionId) {
         self.end(id, EndReason::ConnectionLost);
@@ -240,13 +238,12 @@ impl Sessions {
         self.end(id, EndReason::NoPlace);
     }
 
-    /// Ends sessions of which nothing was heard: players without input, spectators that never showed their token.
+    /// Ends sessions of which nothing was heard; spectators send inputs too, which drive nothing.
     pub fn expire(&mut self, now_ms: u64) {
         let timeout_ms = self.limits.input_timeout_ms;
         for slot in 0..self.slots() {
             let Slot::Taken(session) = &self.slots[usize::from(slot)] else { continue };
-            let must_speak = session.role == Role::Player || !session.has_shown_token;
-            if must_speak && now_ms.saturating_sub(session.heard_ms) > timeout_ms {
+            if now_ms.saturating_sub(session.heard_ms) > timeout_ms {
                 self.end(SessionId { slot, epoch: session.epoch }, EndReason::Silent { timeout_ms });
             }
         }

@@ -281,8 +281,11 @@ mod tests {
 
     #[test]
     fn sockets_are_counted() {
+        let (inherited, _other) = std::os::unix::net::UnixStream::pair().unwrap();
+        assert_eq!(shell("exec sleep 60").sockets(), 0);
+        rustix::io::fcntl_setfd(&inherited, rustix::io::FdFlags::empty()).unwrap();
         let mut process = shell("exec sleep 60");
-        assert_eq!(process.sockets(), 0);
+        assert_eq!(process.sockets(), 1);
         process.signal(Signal::KILL).unwrap();
         process.wait(SOON).unwrap();
         assert_eq!(process.sockets(), 0);

@@ -113,7 +113,7 @@ impl BotFleet {
             }
             match opening.join_next().await {
                 None => return failed,
-                Some(Ok(Ok((number, session)))) => self.start(number, session),
+                Some(Ok(Ok((number, session)))) => failed = failed.and(self.start(number, session)),
                 Some(Ok(Err(error))) => failed = failed.and(Err(error)),
                 // A task of ours that panicked or was cancelled with the runtime: no bot came of it.
                 Some(Err(error)) => {
@@ -123,15 +123,15 @@ impl BotFleet {
         }
     }
 
-    fn start(&mut self, number: usize, session: Session) {
-        // A player always has an actor; one without would have nothing to drive and is not a bot.
-        let Some(actor) = session.actor() else { return };
+    fn start(&mut self, number: usize, session: Session) -> Result<(), ClientError> {
+        let actor = session.actor().ok_or(ClientError::NoActor)?;
         let script = self.settings.script_of(number);
         let (statistics, meter) = (session.statistics_reader(), Arc::new(Mutex::new(Meter::new())));
         let seed = self.settings.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(number as u64);
         let driver = Driver::new(session, actor, script.script(seed), Arc::clone(&meter));
         let task = tokio::spawn(driver.run(phase_of(number), self.stop.subscribe()));
         self.bots.push(Bot { script, statistics, meter, task });
+        Ok(())
     }
 
     /// All counts since the fleet began.

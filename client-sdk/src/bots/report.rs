@@ -129,6 +129,7 @@ fn figures(tally: &BotTally, elapsed: Duration) -> Value {
         "snapshots_received": session.snapshots_received,
         "snapshots_missed": session.snapshots_missed,
         "snapshots_stale": session.snapshots_stale,
+        "snapshots_foreign": session.snapshots_foreign,
         "events_received": session.events_received,
         "events_missed": session.events_missed,
         "malformed": session.malformed,

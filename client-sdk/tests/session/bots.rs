@@ -15,7 +15,7 @@ use pita_protocol::{
 
 use crate::{
     SOON,
-    fake_server::{self, EVENTS_BEFORE, FakeServer, SLOT},
+    fake_server::{self, EPOCH, EVENTS_BEFORE, FakeServer, SLOT},
     soon,
 };
 
@@ -42,7 +42,7 @@ pub fn run_world(server: Arc<FakeServer>, slots: u16, step: f32) -> tokio::task:
             for slot in SLOT..SLOT + slots {
                 let dof = fake_server::car(10 * u32::from(slot), (tick - 100) as f32 * step);
                 let ack = InputAck { sequence: (tick - 101) as u32, tick };
-                let snapshot = Snapshot { tick, ack, event_sequence: EVENTS_BEFORE, dof };
+                let snapshot = Snapshot { epoch: EPOCH, tick, ack, event_sequence: EVENTS_BEFORE, dof };
                 let key = format!("pita/{}/snapshot/{slot}", fake_server::ARENA);
                 fake_server::put(&server.zenoh, key, encode(&snapshot)).await;
             }
@@ -97,6 +97,14 @@ async fn a_full_server_ends_the_growth_and_keeps_who_is_in() {
     let grown = soon("joining", fleet.add(4)).await;
     assert_eq!(grown, Err(ClientError::Refused(Refusal::Full { slots: 2 })));
     assert_eq!(fleet.len(), 2);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_player_without_a_vehicle_is_an_error() {
+    let server = FakeServer::answering(Box::new(|_| Some(fake_server::accept(SLOT, Role::Spectator)))).await;
+    let mut fleet = fleet(&server);
+    assert_eq!(soon("joining", fleet.add(1)).await, Err(ClientError::NoActor));
+    assert!(fleet.is_empty());
 }
 
 #[tokio::test(flavor = "multi_thread")]

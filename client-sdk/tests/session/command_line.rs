@@ -38,6 +38,13 @@ fn figures(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {output:?}"))
 }
 
+#[test]
+fn prints_version_and_commit() {
+    let output = Command::new(env!("CARGO_BIN_EXE_pita-bots")).arg("--version").output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.starts_with("pita-bots ") && said.contains(env!("CARGO_PKG_VERSION")) && said.contains('('), "{said}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn says_that_nobody_answers_and_gives_up() {
     let server = FakeServer::start().await;

@@ -3,10 +3,11 @@
 use std::time::{Duration, Instant};
 
 use pita_client::{ClientError, Controls, Event, Session, SessionEnd, SessionEvent};
+use pita_protocol::message::Snapshot;
 
 use crate::{
     builder,
-    fake_server::{EVENTS_BEFORE, FakeServer, SLOT},
+    fake_server::{EVENTS_BEFORE, FakeServer, SLOT, description, snapshot},
     player, soon,
 };
 
@@ -47,6 +48,15 @@ async fn a_session_that_was_taken_out_learns_why() {
     server.put_event(EVENTS_BEFORE + 1, Event::Left { slot: SLOT + 1, reason: "other".into() }).await;
     server.put_event(EVENTS_BEFORE + 2, Event::Left { slot: SLOT, reason: "no input for 5 s".into() }).await;
     assert_ends(session, |end| *end == SessionEnd::Removed { reason: "no input for 5 s".into() }).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_whose_actor_is_gone_ends_though_nobody_says_so() {
+    let server = FakeServer::start().await;
+    let session = player(&server).await;
+    *server.description.lock().unwrap() = description(EVENTS_BEFORE + 2, &[]);
+    server.put_snapshot(Snapshot { event_sequence: EVENTS_BEFORE + 2, ..snapshot(102) }).await;
+    assert_ends(session, |end| matches!(end, SessionEnd::Removed { .. })).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

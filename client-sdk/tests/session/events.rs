@@ -1,5 +1,7 @@
 //! The roster follows the events, also when some of them are lost.
 
+use std::{sync::atomic::Ordering, time::Duration};
+
 use pita_client::{Event, Session, SessionEvent};
 use pita_protocol::message::Snapshot;
 
@@ -79,8 +81,14 @@ async fn an_old_description_is_not_believed() {
     *server.description.lock().unwrap() = description(EVENTS_BEFORE, &[]);
     server.put_event(EVENTS_BEFORE + 2, Event::ActorAdded(actor(80))).await;
     assert!(matches!(next(&session).await, SessionEvent::Happened(_)));
-    // Time for an answer; the old description must not take out what is there.
-    tokio::time::sleep(std::time::Duration::from_millis(600)).await;
+    // The session asks one thing after the other: at the second question it has seen the answer to the first. The old
+    // description must not take out what is there.
+    let asked_twice = async {
+        while server.described.load(Ordering::Relaxed) < 2 {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    };
+    soon("two questions", asked_twice).await;
     assert_eq!(ids(&session), [OWN, 80]);
     *server.description.lock().unwrap() = description(EVENTS_BEFORE + 2, &[OWN, 80, 81]);
     eventually(&session, "a new description", |s| s.events_missed == 1).await;

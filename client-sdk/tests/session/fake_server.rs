@@ -5,7 +5,7 @@ use std::{
     net::TcpListener,
     sync::{
         Arc, Mutex,
-        atomic::{AtomicU16, Ordering},
+        atomic::{AtomicU16, AtomicUsize, Ordering},
     },
 };
 
@@ -45,6 +45,8 @@ pub struct FakeServer {
     pub endpoint: String,
     pub zenoh: zenoh::Session,
     pub description: Arc<Mutex<Description>>,
+    /// How often the description was asked for.
+    pub described: Arc<AtomicUsize>,
     keys: Keys,
     inputs: AsyncMutex<mpsc::UnboundedReceiver<(u16, Vec<u8>)>>,
     live: AsyncMutex<mpsc::UnboundedReceiver<(String, bool)>>,
@@ -79,15 +81,20 @@ impl FakeServer {
             let _ = live_sender.send((sample.key_expr().to_string(), sample.kind() == SampleKind::Put));
         });
         live_at.background().await.unwrap();
-        let described = Arc::clone(&description);
+        let (of_description, described) = (Arc::clone(&description), Arc::new(AtomicUsize::new(0)));
+        let counter = Arc::clone(&described);
+        let describe = move |_: &[u8]| {
+            counter.fetch_add(1, Ordering::Relaxed);
+            Some(encode(&*of_description.lock().unwrap()))
+        };
         let status = encode(&Status { arena: ARENA.into(), ..Status::default() });
         let queryables = vec![
             answer(&zenoh, keys.join(), join).await,
-            answer(&zenoh, keys.describe(), Box::new(move |_| Some(encode(&*described.lock().unwrap())))).await,
+            answer(&zenoh, keys.describe(), Box::new(describe)).await,
             answer(&zenoh, keys.status(), Box::new(move |_| Some(status.clone()))).await,
         ];
         let (inputs, live) = (AsyncMutex::new(inputs), AsyncMutex::new(live));
-        Self { endpoint, zenoh, description, keys, inputs, live, queryables }
+        Self { endpoint, zenoh, description, described, keys, inputs, live, queryables }
     }
 
     /// Lets another arena answer status queries.
@@ -216,7 +223,7 @@ pub fn actor(id: u32) -> ActorDescription {
 /// The own car of the first session at `x = tick − 100` m.
 pub fn snapshot(tick: u64) -> Snapshot {
     let x = tick as f32 - 100.0;
-    Snapshot { tick, ack: InputAck::default(), event_sequence: EVENTS_BEFORE, dof: car(ROOT, x) }
+    Snapshot { epoch: EPOCH, tick, ack: InputAck::default(), event_sequence: EVENTS_BEFORE, dof: car(ROOT, x) }
 }
 
 /// One rigid body at `x`, 30 m/s fast along it.

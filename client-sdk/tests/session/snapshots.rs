@@ -3,11 +3,11 @@
 use std::time::{Duration, Instant};
 
 use pita_client::{Controls, InterpolationSettings};
-use pita_protocol::message::InputAck;
+use pita_protocol::message::{InputAck, Snapshot};
 
 use crate::{
     builder, eventually,
-    fake_server::{FakeServer, ROOT, snapshot},
+    fake_server::{EPOCH, FakeServer, ROOT, snapshot},
     first_snapshot, player, soon,
 };
 
@@ -30,6 +30,17 @@ async fn the_newest_wins_and_gaps_are_counted() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn what_is_for_another_session_of_the_slot_is_not_taken() {
+    let server = FakeServer::start().await;
+    let session = player(&server).await;
+    server.put_snapshot(Snapshot { epoch: EPOCH + 1, ..snapshot(102) }).await;
+    server.put_snapshot(snapshot(103)).await;
+    let counts = eventually(&session, "both", |s| s.snapshots_received == 2 && s.snapshots_foreign == 1).await;
+    assert_eq!((counts.snapshots_missed, counts.malformed), (1, 0));
+    assert_eq!(session.latest_snapshot().unwrap().tick(), 103);
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn acknowledgements_give_the_latency() {
     let server = FakeServer::start().await;
     let session = player(&server).await;
@@ -40,7 +51,7 @@ async fn acknowledgements_give_the_latency() {
     assert_eq!(packet.snapshot_tick, 101, "it acknowledges the newest snapshot");
     tokio::time::sleep(Duration::from_millis(50)).await;
     let ack = InputAck { sequence: 3, tick: 102 };
-    server.put_snapshot(pita_protocol::message::Snapshot { ack, ..snapshot(102) }).await;
+    server.put_snapshot(Snapshot { ack, ..snapshot(102) }).await;
     let counts = eventually(&session, "three latencies", |s| s.latency_us.len() == 3).await;
     assert!(counts.latency_us.min() >= 49_000, "{} µs", counts.latency_us.min());
     assert_eq!(counts.inputs_sent, 5);

@@ -101,13 +101,9 @@ fn declare(shared: &Arc<Shared>, session: &zenoh::Session, asker: &Asker) -> zen
 
 fn token_changed(shared: &Shared, key: &str, kind: SampleKind) {
     let Some((slot, epoch)) = shared.keys.session_of_live(key) else { return };
-    let id = SessionId { slot, epoch };
-    match kind {
-        SampleKind::Put => shared.sessions().token_appeared(id),
-        SampleKind::Delete => {
-            shared.sessions().token_disappeared(id);
-            shared.wake_publisher();
-        }
+    if kind == SampleKind::Delete {
+        shared.sessions().token_disappeared(SessionId { slot, epoch });
+        shared.wake_publisher();
     }
 }
 

@@ -1,10 +1,13 @@
 use super::*;
 use pita_protocol::message::InputFrame;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 const LIMITS: Limits = Limits { players: 2, spectators: 1, input_timeout_ms: 5000, input_packets_per_tick: 4 };
 
 fn join(sessions: &mut Sessions, role: Role, now_ms: u64) -> Result<SessionId, JoinRefusal> {
-    sessions.join("Wu", role, SessionKey([1; 32]), now_ms)
+    static EPOCHS: AtomicU32 = AtomicU32::new(1);
+    let secrets = Secrets { epoch: EPOCHS.fetch_add(1, Ordering::Relaxed), key: SessionKey([1; 32]) };
+    sessions.join("Wu", role, secrets, now_ms)
 }
 
 fn packet(epoch: u32, sequences: &[u32]) -> InputPacket {
@@ -108,31 +111,23 @@ fn leaving_ends_the_session_whatever_the_sequence() {
 }
 
 #[test]
-fn silence_ends_players_and_spectators_that_never_came() {
+fn silence_ends_players_and_spectators() {
     let mut sessions = Sessions::new(LIMITS);
     let player = join(&mut sessions, Role::Player, 0).unwrap();
     let silent = join(&mut sessions, Role::Player, 0).unwrap();
     let spectator = join(&mut sessions, Role::Spectator, 0).unwrap();
-    sessions.token_appeared(silent);
-    sessions.token_appeared(spectator);
     taken(&mut sessions);
     sessions.receive(player.slot, &packet(player.epoch, &[1]), 1, 4000).unwrap();
+    sessions.receive(spectator.slot, &packet(spectator.epoch, &[1]), 1, 6000).unwrap();
+    let reason = EndReason::Silent { timeout_ms: 5000 };
     sessions.expire(5000);
     assert_eq!(taken(&mut sessions), []);
     sessions.expire(5001);
-    assert_eq!(taken(&mut sessions), [ended(silent, EndReason::Silent { timeout_ms: 5000 })]);
+    assert_eq!(taken(&mut sessions), [ended(silent, reason)]);
     sessions.expire(9001);
-    assert_eq!(taken(&mut sessions), [ended(player, EndReason::Silent { timeout_ms: 5000 })]);
-    sessions.expire(1_000_000);
-    assert_eq!(taken(&mut sessions), [], "a spectator that holds its token stays");
-
-    sessions.token_disappeared(spectator);
-    taken(&mut sessions);
-    let absent = join(&mut sessions, Role::Spectator, 0).unwrap();
-    taken(&mut sessions);
-    sessions.expire(5001);
-    let reason = EndReason::Silent { timeout_ms: 5000 };
-    assert_eq!(taken(&mut sessions), [Change::Ended { id: absent, role: Role::Spectator, reason }]);
+    assert_eq!(taken(&mut sessions), [ended(player, reason)]);
+    sessions.expire(11_001);
+    assert_eq!(taken(&mut sessions), [Change::Ended { id: spectator, role: Role::Spectator, reason }]);
     assert_eq!(reason.to_string(), "no input for 5 s");
 }
 

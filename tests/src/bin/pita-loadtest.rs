@@ -23,7 +23,7 @@ fn measure(options: &Options) -> ExitCode {
         .and_then(|runtime| runtime.block_on(ramp::run(options)).map_err(|error| error.to_string()))
         .and_then(|report| show(&report, options).map(|()| report));
     match outcome {
-        Ok(report) if report.lost() == 0 => ExitCode::SUCCESS,
+        Ok(report) if report.is_good() => ExitCode::SUCCESS,
         Ok(_) => ExitCode::FAILURE,
         Err(error) => {
             eprintln!("pita-loadtest: {error}");

@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::str::FromStr;
 
 use clap::Parser;
 use pita_game::scene::Scene;
@@ -10,7 +11,7 @@ use pita_server::trace::{self, Trace};
 use pita_sim::Settings;
 
 #[derive(Parser)]
-#[command(version = pita_protocol::build_info::VERSION_AND_COMMIT, about = "Runs a yardstick scene and writes its trace and times")]
+#[command(name = "pita-yardstick", version = pita_protocol::build_info::VERSION_AND_COMMIT, about = "Runs a yardstick scene and writes its trace and times")]
 struct Arguments {
     /// Scene to run.
     scene: PathBuf,
@@ -60,18 +61,22 @@ fn settings(arguments: &Arguments) -> Result<Settings, String> {
             format!("variant option {option:?}: expected default, newton=N, tol=, forcing=, kn=, kt=, kj= or threads=N")
         };
         let (key, value) = option.split_once('=').ok_or_else(unknown)?;
-        let number: f64 = value.parse().map_err(|_| format!("variant option {option:?}: {value:?} is not a number"))?;
         match key {
-            "newton" => settings.solver.newton_iterations = number as usize,
-            "tol" => settings.solver.tolerance = number,
-            "forcing" => settings.solver.forcing = number,
-            "kj" => settings.solver.joint_stiffness = number,
-            "kn" => settings.contact.normal_stiffness = number,
-            "kt" => settings.contact.tangent_stiffness = number,
-            "threads" => settings.threads = number as usize,
+            "newton" => settings.solver.newton_iterations = parsed(option, value, "a whole number")?,
+            "tol" => settings.solver.tolerance = parsed(option, value, "a number")?,
+            "forcing" => settings.solver.forcing = parsed(option, value, "a number")?,
+            "kj" => settings.solver.joint_stiffness = parsed(option, value, "a number")?,
+            "kn" => settings.contact.normal_stiffness = parsed(option, value, "a number")?,
+            "kt" => settings.contact.tangent_stiffness = parsed(option, value, "a number")?,
+            "threads" => settings.threads = parsed(option, value, "a whole number")?,
             _ => return Err(unknown()),
         }
     }
     settings.validate().map_err(|error| format!("variant {:?}: {error}", arguments.variant))?;
     Ok(settings)
+}
+
+/// The value of an option.
+fn parsed<T: FromStr>(option: &str, value: &str, kind: &str) -> Result<T, String> {
+    value.parse().map_err(|_| format!("variant option {option:?}: {value:?} is not {kind}"))
 }

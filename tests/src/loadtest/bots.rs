@@ -9,8 +9,8 @@ use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
-use pita_client::ClientError;
 use pita_client::bots::{BotFleet, FleetSettings, FleetTally, ScriptKind};
+use pita_client::{ClientError, Durations};
 use rustix::time::{ClockId, clock_gettime};
 use tokio::sync::mpsc;
 
@@ -142,14 +142,16 @@ impl Mark {
 
     fn figures(&self, fleet: &BotFleet) -> BotFigures {
         let counted = fleet.tally().since(&self.tally).total();
-        let ms = |us: u64| us as f64 / 1000.0;
+        let ms = |durations: &Durations, quantile| {
+            (!durations.is_empty()).then(|| durations.value_at_quantile(quantile) as f64 / 1000.0)
+        };
         let elapsed_s = self.at.elapsed().as_secs_f64();
         let rate = |bytes: u64| bytes as f64 / elapsed_s / fleet.len().max(1) as f64;
         BotFigures {
             cpu_cores: (process_cpu_time() - self.cpu).as_secs_f64() / elapsed_s,
-            late_p99_ms: ms(counted.lateness_us.value_at_quantile(0.99)),
-            effect_p50_ms: ms(counted.session.latency_us.value_at_quantile(0.50)),
-            effect_p99_ms: ms(counted.session.latency_us.value_at_quantile(0.99)),
+            late_p99_ms: ms(&counted.lateness_us, 0.99),
+            effect_p50_ms: ms(&counted.session.latency_us, 0.50),
+            effect_p99_ms: ms(&counted.session.latency_us, 0.99),
             distance_min_m: counted.distance_min_m(),
             received_bytes_per_s_per_client: rate(counted.session.received_bytes),
             sent_bytes_per_s_per_client: rate(counted.session.sent_bytes),

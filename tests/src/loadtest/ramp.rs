@@ -41,15 +41,18 @@ pub enum LoadTestError {
 /// Runs the whole ramp: starts a server unless told of one, measures each number of clients, ends the server in order.
 ///
 /// # Errors
-/// [`LoadTestError`]: what did not run, with what it printed. Lost clients are no error here: the report has them.
+/// [`LoadTestError`] before the first step: what did not run, with what it printed. A step that fails ends the ramp, and
+/// clients may be lost: the report has both.
 pub async fn run(options: &Options) -> Result<Report, LoadTestError> {
     if let Some(endpoint) = &options.connect {
         return ramp(endpoint, options, None).await;
     }
     let cores = server::cores(options);
     let server = ServerProcess::start(&mut server::command(options, &cores))?;
-    let report = ramp(&server.endpoint, options, Some(cores)).await?;
-    server.stop()?;
+    let mut report = ramp(&server.endpoint, options, Some(cores)).await?;
+    if let Err(error) = server.stop() {
+        report.fail(error.to_string());
+    }
     Ok(report)
 }
 
@@ -58,9 +61,16 @@ async fn ramp(endpoint: &str, options: &Options, server_cores: Option<Vec<usize>
     let status = observer.status().await?;
     let mut report = Report::new(status.version, status.arena, status.tick_hz, server_cores);
     for &clients in &options.clients {
-        let step = measure(&observer, endpoint, options, usize::from(clients)).await?;
-        eprintln!("{}", step.line());
-        report.push(step);
+        match measure(&observer, endpoint, options, usize::from(clients)).await {
+            Ok(step) => {
+                eprintln!("{}", step.line());
+                report.push(step);
+            }
+            Err(error) => {
+                report.fail(format!("{clients} clients: {error}"));
+                break;
+            }
+        }
     }
     Ok(report)
 }
@@ -99,7 +109,7 @@ async fn measure(
         server_cpu_cores: (after.cpu_s - before.cpu_s) / (after.uptime_s - before.uptime_s).max(f64::MIN_POSITIVE),
         server_memory_bytes: after.memory_bytes,
         bots: bot_figures,
-        bots_starved: bot_figures.late_p99_ms > STARVED_LATENESS_TICKS * tick_ms,
+        bots_starved: bot_figures.late_p99_ms.is_some_and(|late_ms| late_ms > STARVED_LATENESS_TICKS * tick_ms),
     })
 }
 

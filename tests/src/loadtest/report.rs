@@ -30,12 +30,12 @@ pub struct Step {
 pub struct BotFigures {
     /// CPU time of the bots' process over wall time, cores.
     pub cpu_cores: f64,
-    /// How late a bot sent its input after it meant to, 99th percentile, ms.
-    pub late_p99_ms: f64,
-    /// From sending an input to the first snapshot that has its effect, median, ms.
-    pub effect_p50_ms: f64,
+    /// How late a bot sent its input after it meant to, 99th percentile, ms; `None` where none was sent.
+    pub late_p99_ms: Option<f64>,
+    /// From sending an input to the first snapshot that has its effect, median, ms; `None` where none was seen.
+    pub effect_p50_ms: Option<f64>,
     /// The same, 99th percentile, ms.
-    pub effect_p99_ms: f64,
+    pub effect_p99_ms: Option<f64>,
     /// Shortest path that a bot's car drove, m.
     pub distance_min_m: f64,
     /// Payload from the server, bytes/s a client.
@@ -67,6 +67,8 @@ pub struct Report {
     pub server_cores: Option<Vec<usize>>,
     /// The steps, in the order in which they ran.
     pub steps: Vec<Step>,
+    /// Why the ramp ended before its last step.
+    pub failure: Option<String>,
     /// First number of clients at which the p99 tick time passed 16.7 ms.
     pub p99_over_16_7_ms_at_clients: Option<usize>,
     /// First number of clients at which the p99 tick time passed 33.3 ms.
@@ -84,6 +86,7 @@ impl Report {
             cores: std::thread::available_parallelism().map_or(1, usize::from),
             server_cores,
             steps: Vec::new(),
+            failure: None,
             p99_over_16_7_ms_at_clients: None,
             p99_over_33_3_ms_at_clients: None,
         }
@@ -101,6 +104,16 @@ impl Report {
         self.steps.iter().map(|step| step.bots.lost).sum()
     }
 
+    /// Notes that the run went no further, and why; the first reason counts.
+    pub fn fail(&mut self, why: String) {
+        self.failure.get_or_insert(why);
+    }
+
+    /// Whether every step was measured and no client lost.
+    pub fn is_good(&self) -> bool {
+        self.failure.is_none() && self.lost() == 0
+    }
+
     /// Tables and verdict.
     pub fn text(&self) -> String {
         let mut text = format!(
@@ -116,6 +129,9 @@ impl Report {
         }
         if self.lost() > 0 {
             text += &format!("{} clients were lost\n", self.lost());
+        }
+        if let Some(why) = &self.failure {
+            text += &format!("the run ended early: {why}\n");
         }
         text
     }
@@ -200,8 +216,8 @@ impl Report {
                     format!("{:.1}", bots.received_bytes_per_s_per_client / 1000.0),
                     format!("{:.1}", bots.sent_bytes_per_s_per_client / 1000.0),
                     format!("{:.0}", 100.0 * bots.cpu_cores),
-                    ms(bots.late_p99_ms),
-                    format!("{} / {}", ms(bots.effect_p50_ms), ms(bots.effect_p99_ms)),
+                    measured_ms(bots.late_p99_ms),
+                    format!("{} / {}", measured_ms(bots.effect_p50_ms), measured_ms(bots.effect_p99_ms)),
                     format!("{} of {}", bots.missed_snapshots, bots.snapshots + bots.missed_snapshots),
                     bots.lost.to_string(),
                 ]
@@ -216,7 +232,7 @@ impl Step {
         let (tick, late) = (&self.ticks.tick, self.bots.late_p99_ms);
         let (p50, p99, max) = (ms(tick.p50_ms), ms(tick.p99_ms), ms(tick.max_ms));
         let clients = self.marked_clients();
-        format!("{clients:>4} clients: tick p50 {p50} p99 {p99} max {max} ms; bots late p99 {} ms", ms(late))
+        format!("{clients:>4} clients: tick p50 {p50} p99 {p99} max {max} ms; bots late p99 {} ms", measured_ms(late))
     }
 
     fn marked_clients(&self) -> String {
@@ -228,6 +244,11 @@ impl Step {
 fn ms(value: f64) -> String {
     let decimals = if value < 10.0 { 2 } else { 1 };
     format!("{value:.decimals$}")
+}
+
+/// The same of what may not have been measured.
+fn measured_ms(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".to_owned(), ms)
 }
 
 #[cfg(test)]
@@ -277,12 +298,23 @@ mod tests {
         let starved = Step { bots_starved: true, ..step(32, 9.0) };
         let lossy = Step { bots: BotFigures { lost: 3, ..Default::default() }, ..step(64, 9.0) };
         let report = report([starved, lossy]);
-        assert_eq!(report.lost(), 3);
+        assert!(report.lost() == 3 && !report.is_good());
         let text = report.text();
         assert!(
             text.contains("32*") && text.contains("bots starved") && text.contains("3 clients were lost"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn a_failure_keeps_what_was_measured_and_is_told() {
+        let mut report = report([step(8, 9.0)]);
+        assert!(report.is_good());
+        report.fail("16 clients: the bots ended".into());
+        report.fail("the server failed".into());
+        assert!(!report.is_good() && report.steps.len() == 1);
+        let text = report.text();
+        assert!(text.contains("the run ended early: 16 clients: the bots ended") && text.contains("- / -"), "{text}");
     }
 
     #[test]

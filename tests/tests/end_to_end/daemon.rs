@@ -118,9 +118,12 @@ fn a_bad_arena_is_named_by_check_and_run() {
 
 #[test]
 fn every_binary_prints_version_and_commit() {
-    for binary in
-        [env!("CARGO_BIN_EXE_pita-test-server"), env!("CARGO_BIN_EXE_pita-loadtest"), env!("CARGO_BIN_EXE_pita-bench")]
-    {
+    for binary in [
+        env!("CARGO_BIN_EXE_pita-test-server"),
+        env!("CARGO_BIN_EXE_pita-loadtest"),
+        env!("CARGO_BIN_EXE_pita-bench"),
+        env!("CARGO_BIN_EXE_pita-yardstick"),
+    ] {
         let Ended { success, said } = run(Command::new(binary).arg("--version"));
         assert!(success && said.contains(env!("CARGO_PKG_VERSION")) && said.contains('('), "{said}");
     }

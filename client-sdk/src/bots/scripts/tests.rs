@@ -67,7 +67,7 @@ fn snapshot(tick: u64, cars: &[Car]) -> ReceivedSnapshot {
         let v: Vec<f32> = car.velocity().to_array().into_iter().chain([0.0; 3]).collect();
         pack(10 * id, KIND_RIGID_BODY, q.into_iter(), v.into_iter(), &mut dof);
     }
-    let head = Snapshot { tick, ack: InputAck::default(), event_sequence: 0, dof };
+    let head = Snapshot { epoch: 0, tick, ack: InputAck::default(), event_sequence: 0, dof };
     ReceivedSnapshot::new(head, Instant::now(), Arc::default())
 }
 
