@@ -35,6 +35,10 @@ const DELAY_TICKS_MAX: u64 = 2;
 const ROUNDS: usize = 3;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[expect(
+    clippy::await_holding_lock,
+    reason = "who waits for the lock is another test, on a thread and a runtime of its own"
+)]
 async fn frozen_clients_do_not_delay_the_others() {
     let _alone = COMPANY.write().unwrap_or_else(PoisonError::into_inner);
     let mut rounds = Vec::new();
