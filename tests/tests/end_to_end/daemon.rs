@@ -10,7 +10,7 @@ use pita_tests::process::Signal;
 
 use crate::clients::connect;
 use crate::run::{Ended, free_port, run};
-use crate::{SOON, Server, observe, pita_server, start_server};
+use crate::{SOON, observed, pita_server, start_server};
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn it_says_how_it_does() {
@@ -80,8 +80,7 @@ fn check_accepts_the_defaults_from_any_folder() {
 async fn it_runs_in_any_folder_and_at_25_hz() {
     let folder = tempfile::tempdir().unwrap();
     let mut command = pita_server();
-    let server = Server::start(command.args(["run", "--tick-hz", "25"]).current_dir(folder.path()));
-    let observer = observe(&server).await;
+    let (server, observer) = observed(command.args(["run", "--tick-hz", "25"]).current_dir(folder.path())).await;
     assert_eq!(observer.status().await.unwrap().tick_hz, 25);
     server.stop().unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "it left files");

@@ -7,11 +7,10 @@ use rustix::process::kill_process;
 use serde_json::Value;
 
 use crate::run::{Ended, free_port, run};
-use crate::{LONG, await_clients, eventually, in_company, start_server};
+use crate::{LONG, await_clients, eventually, start_server};
 
 #[test]
 fn a_short_load_test_measures_each_step_and_leaves_its_figures() {
-    let _company = in_company();
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("new").join("folder");
     let json = folder.path().join("figures.json");
