@@ -136,10 +136,9 @@ impl Integrator {
         let Settings { dt, solver, contact: contact_settings, .. } = scene.settings;
         for (source, contact) in (0u32..).zip(scene.contacts.iter()) {
             let Some(ends) = self.contact_ends[source as usize] else { continue };
-            let bodies = ends.map(|end| self.active.get(end as usize).map(|&id| &scene.bodies[id]));
             let Some((solve, nodes)) = self.localise(ends) else { continue };
             let all = &solve.problem.nodes;
-            let arms = [0, 1].map(|i| arm(all, nodes[i], bodies[i], contact));
+            let arms = nodes.map(|i| arm(all, i, contact.position));
             let mass = reduced_mass(all, nodes);
             let speeds = [0, 1].map(|i| before(all, nodes[i]).at(arms[i]));
             let closing = contact.normal.dot(speeds[0] - speeds[1]);
@@ -290,18 +289,9 @@ fn before(nodes: &[Node], node: NodeIndex) -> Twist {
 }
 
 /// From a body's centre of mass to a contact point; none for what does not turn.
-///
-/// The normal of a surface of revolution passes through its axis, so spin moves no such surface along its normal. Points
-/// found on flat features of the other body can lie beside that plane, by centimetres, and a wheel's spin would drive
-/// them half a metre deep in a tick: such an arm is taken back into the plane.
-fn arm(nodes: &[Node], node: NodeIndex, body: Option<&Body>, contact: &ContactPoint) -> DVec3 {
-    let (Some(node), Some(body)) = (nodes.get(node as usize).filter(|node| node.rotates), body) else {
-        return DVec3::ZERO;
-    };
-    let arm = contact.position - node.start.position;
-    let axis = body.collider.as_ref().and_then(|collider| collider.shape().revolution_axis());
-    match axis.and_then(|axis| (node.start.rotation * axis).cross(contact.normal).try_normalize()) {
-        Some(beside) => arm.reject_from_normalized(beside),
-        None => arm,
+fn arm(nodes: &[Node], node: NodeIndex, point: DVec3) -> DVec3 {
+    match nodes.get(node as usize) {
+        Some(body) if body.rotates => point - body.start.position,
+        _ => DVec3::ZERO,
     }
 }
