@@ -137,6 +137,37 @@ fn assert_named(command: &mut Command, file: &str, words: &[&str]) {
     }
 }
 
+/// A ball in free fall for three ticks: the trace holds its velocity, and is the same twice.
+#[test]
+fn simulate_runs_a_scene_and_leaves_its_trace() {
+    let folder = tempfile::tempdir().unwrap();
+    let ball = "body sphere 0.5 0 0 1 0.1 0.1 0.1 0 2 0 1 0 0 0 0 0 0 0 0 0 0.5 1";
+    let scene = written(folder.path(), "ball.scene", &format!("ticks 3\ngravity 0 -9 0\n{ball}\n"));
+    let simulate = |name: &str| {
+        let out = folder.path().join(name);
+        let Ended { success, said } = run(pita_server().args(["simulate", &scene, "--json", "--out"]).arg(&out));
+        assert!(success, "{said}");
+        let numbers = |extension| {
+            let bytes = std::fs::read(out.with_extension(extension)).unwrap();
+            bytes.chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect::<Vec<_>>()
+        };
+        (numbers("tr"), numbers("ms").len())
+    };
+    let (states, times) = simulate("a");
+    assert_eq!((states.len(), times), (4 * 13, 3 * 2));
+    assert!((states[3 * 13 + 8] + 9.0 * 3.0 / 30.0).abs() < 1e-9, "{states:?}");
+    assert_eq!(simulate("b").0, states);
+}
+
+#[test]
+fn simulate_names_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = written(folder.path(), "bad.scene", "ticks 3\nbody teapot\n");
+    assert_named(pita_server().args(["simulate", &scene]), "bad.scene", &["line 2", "body takes 22 numbers"]);
+    let missing = folder.path().join("missing").join("out").display().to_string();
+    assert_named(pita_server().args(["simulate", "proving-ground", "--ticks", "2", "--out", &missing]), "out.tr", &[]);
+}
+
 fn written(folder: &Path, name: &str, text: &str) -> String {
     let file = folder.join(name);
     std::fs::write(&file, text).unwrap();
