@@ -1,16 +1,19 @@
 //! Implicit Euler: from Q0, Q0' and the potentials to Q1, Q1' (the talk's "BOOM!").
 //!
 //! `problem` is an island with its potentials as one residual; `newton` makes the residual zero (the Cel Damage
-//! solver: truncated Newton), with the `line_search`, the sparse `system` and the `conjugate_gradient` under it.
+//! solver: truncated Newton), with the `line_search`, the sparse `matrix` and the preconditioned `conjugate_gradient`
+//! under it.
 //! Islands share nothing while they are solved, so that threads cannot change the result.
 
 pub(crate) mod block;
 mod conjugate_gradient;
 mod line_search;
+mod matrix;
 mod newton;
+mod preconditioner;
 pub(crate) mod problem;
 mod step;
-mod system;
+mod vector;
 
 pub(crate) use step::{Integrator, Scene};
 

@@ -2,10 +2,12 @@
 //! conjugate gradients, then walk along the answer with a non-linear line search.
 
 use super::block::Entry;
-use super::conjugate_gradient::{ConjugateGradient, add_scaled};
+use super::conjugate_gradient::ConjugateGradient;
 use super::line_search;
+use super::matrix::Matrix;
+use super::preconditioner::{IncompleteFactorization, Preconditioner};
 use super::problem::{Problem, entry_of};
-use super::system::{System, inner};
+use super::vector::{add_scaled, inner};
 use crate::dof::{Node, Twist};
 use crate::settings::SolverSettings;
 
@@ -27,7 +29,8 @@ pub(crate) struct Newton<const D: usize> {
     start: Vec<Entry<D>>,
     residual: Vec<Entry<D>>,
     step: Vec<Entry<D>>,
-    system: System<D>,
+    matrix: Matrix<D>,
+    preconditioner: IncompleteFactorization<D>,
     linear: ConjugateGradient<D>,
 }
 
@@ -48,10 +51,12 @@ impl<const D: usize> Newton<D> {
                 return info;
             }
             if info.newton_iterations == 0 {
-                self.system.analyse(problem);
+                self.matrix.analyse(problem);
             }
-            self.system.assemble(problem);
-            info.linear_iterations += self.linear.solve(&self.system, &self.residual, settings.forcing, &mut self.step);
+            self.matrix.assemble(problem);
+            self.preconditioner.prepare(&self.matrix);
+            let Self { matrix, preconditioner, residual, step, .. } = self;
+            info.linear_iterations += self.linear.solve(matrix, preconditioner, residual, settings.forcing, step);
             info.newton_iterations += 1;
             problem.propose(&self.step);
             info.evaluations += self.walk(problem);

@@ -1,0 +1,235 @@
+//! The matrix of a Newton iteration: symmetric, sparse, of D×D blocks.
+//!
+//! Owns pattern, storage, assembly from an island's problem and the product with a vector; it knows nothing of
+//! factorisations. Stored are the diagonal and the lower triangle, row by row, columns ascending.
+
+use super::block::{Block, Entry, multiply_add, transposed_multiply_add, zero};
+use super::problem::{Problem, Visitor};
+use crate::potential::{Candidate, FIXED, NodeIndex, PairBlocks, Term};
+
+/// Marks a term without an off-diagonal block.
+const NONE: u32 = u32::MAX;
+
+/// A symmetric block-sparse matrix.
+#[derive(Default)]
+pub(super) struct Matrix<const D: usize> {
+    /// `columns[rows[i]..rows[i + 1]]` are the columns of row i, all below i.
+    pub rows: Vec<u32>,
+    pub columns: Vec<u32>,
+    pub diagonal: Vec<Block<D>>,
+    /// Blocks below the diagonal, as `columns` has them.
+    pub lower: Vec<Block<D>>,
+    /// Off-diagonal block of each term, in the order of visits.
+    slots: Vec<u32>,
+    pairs: Vec<(u32, u32)>,
+}
+
+impl<const D: usize> Matrix<D> {
+    /// Finds the sparsity pattern of `problem`.
+    pub fn analyse(&mut self, problem: &mut Problem) {
+        let n = problem.nodes.len();
+        self.pairs.clear();
+        problem.terms.visit(&mut Pairs { pairs: &mut self.pairs });
+        self.pairs.sort_unstable();
+        self.pairs.dedup();
+        self.rows.clear();
+        self.rows.resize(n + 1, 0);
+        self.columns.clear();
+        for &(row, column) in &self.pairs {
+            self.rows[row as usize + 1] += 1;
+            self.columns.push(column);
+        }
+        for i in 0..n {
+            self.rows[i + 1] += self.rows[i];
+        }
+        self.slots.clear();
+        problem.terms.visit(&mut Slots { rows: &self.rows, columns: &self.columns, slots: &mut self.slots });
+        self.diagonal.resize(n, zero());
+        self.lower.resize(self.columns.len(), zero());
+    }
+
+    /// Sums up M + dt² ∂²Φ at the problem's trial.
+    pub fn assemble(&mut self, problem: &mut Problem) {
+        for (block, node) in self.diagonal.iter_mut().zip(&problem.nodes) {
+            *block = zero();
+            for (i, row) in block.iter_mut().enumerate() {
+                if i < 3 {
+                    row[i] = node.mass;
+                } else {
+                    // The inertia is symmetric: its columns are its rows.
+                    row[3..].copy_from_slice(&node.inertia.col(i - 3).to_array());
+                }
+            }
+        }
+        self.lower.fill(zero());
+        let candidate = Candidate { dt: problem.dt, trial: &problem.trial };
+        problem.terms.visit(&mut Assemble {
+            candidate,
+            diagonal: &mut self.diagonal,
+            lower: &mut self.lower,
+            slots: self.slots.iter(),
+        });
+    }
+
+    /// y = A x.
+    pub fn multiply(&self, x: &[Entry<D>], y: &mut [Entry<D>]) {
+        for i in 0..y.len() {
+            y[i] = [0.0; D];
+            multiply_add(&self.diagonal[i], &x[i], &mut y[i]);
+            for k in self.row(i) {
+                let j = self.columns[k] as usize;
+                multiply_add(&self.lower[k], &x[j], &mut y[i]);
+                transposed_multiply_add(&self.lower[k], &x[i], &mut y[j]);
+            }
+        }
+    }
+
+    /// Places of row i in `columns` and `lower`.
+    pub fn row(&self, i: usize) -> std::ops::Range<usize> {
+        self.rows[i] as usize..self.rows[i + 1] as usize
+    }
+}
+
+/// Row and column of the lower-triangle block between two bodies.
+fn place([a, b]: [NodeIndex; 2]) -> Option<(u32, u32)> {
+    (a != FIXED && b != FIXED).then(|| (a.max(b), a.min(b)))
+}
+
+struct Pairs<'a> {
+    pairs: &'a mut Vec<(u32, u32)>,
+}
+
+impl Visitor for Pairs<'_> {
+    fn visit<T: Term>(&mut self, terms: &mut [T]) {
+        self.pairs.extend(terms.iter().filter_map(|term| place(term.nodes())));
+    }
+}
+
+struct Slots<'a> {
+    rows: &'a [u32],
+    columns: &'a [u32],
+    slots: &'a mut Vec<u32>,
+}
+
+impl Visitor for Slots<'_> {
+    fn visit<T: Term>(&mut self, terms: &mut [T]) {
+        for term in terms {
+            let slot = place(term.nodes()).and_then(|(row, column)| {
+                let (start, end) = (self.rows[row as usize], self.rows[row as usize + 1]);
+                let found = self.columns[start as usize..end as usize].binary_search(&column);
+                found.ok().map(|k| start + k as u32)
+            });
+            self.slots.push(slot.unwrap_or(NONE));
+        }
+    }
+}
+
+struct Assemble<'a, const D: usize> {
+    candidate: Candidate<'a>,
+    diagonal: &'a mut [Block<D>],
+    lower: &'a mut [Block<D>],
+    slots: std::slice::Iter<'a, u32>,
+}
+
+impl<const D: usize> Visitor for Assemble<'_, D> {
+    fn visit<T: Term>(&mut self, terms: &mut [T]) {
+        let factor = self.candidate.dt * self.candidate.dt;
+        for (term, &slot) in terms.iter().zip(&mut self.slots) {
+            let PairBlocks { aa, ab, bb } = term.hessian(&self.candidate);
+            let [a, b] = term.nodes();
+            if a != FIXED {
+                add_scaled(&mut self.diagonal[a as usize], &aa, factor, false);
+            }
+            if b != FIXED {
+                add_scaled(&mut self.diagonal[b as usize], &bb, factor, false);
+            }
+            if slot != NONE {
+                add_scaled(&mut self.lower[slot as usize], &ab, factor, a < b);
+            }
+        }
+    }
+}
+
+/// target += factor source, or its transpose; the leading D×D part of it.
+fn add_scaled<const D: usize>(target: &mut Block<D>, source: &Block<6>, factor: f64, transposed: bool) {
+    for i in 0..D {
+        for j in 0..D {
+            target[i][j] += factor * if transposed { source[j][i] } else { source[i][j] };
+        }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    pub const D: usize = 3;
+
+    /// A positive definite matrix with blocks below the diagonal at `pairs`, sorted by row, and the same one dense.
+    pub fn matrix(n: usize, pairs: &[(u32, u32)], numbers: &[f64]) -> (Matrix<D>, Vec<Vec<f64>>) {
+        let mut numbers = numbers.iter().copied().cycle();
+        let mut matrix = Matrix::<D> { pairs: pairs.to_vec(), ..Matrix::default() };
+        matrix.rows = vec![0; n + 1];
+        for &(row, column) in pairs {
+            matrix.columns.push(column);
+            (row as usize + 1..=n).for_each(|i| matrix.rows[i] += 1);
+        }
+        let mut dense = vec![vec![0.0; D * n]; D * n];
+        for &(row, column) in pairs {
+            let block: Block<D> = std::array::from_fn(|_| std::array::from_fn(|_| numbers.next().unwrap()));
+            for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+                let (p, q) = (D * row as usize + i, D * column as usize + j);
+                (dense[p][q], dense[q][p]) = (block[i][j], block[i][j]);
+            }
+            matrix.lower.push(block);
+        }
+        for (i, row) in dense.iter_mut().enumerate() {
+            // Diagonally dominant, so positive definite.
+            row[i] = 0.1 + row.iter().map(|x| x.abs()).sum::<f64>();
+        }
+        let diagonal = |i: usize| std::array::from_fn(|p| std::array::from_fn(|q| dense[D * i + p][D * i + q]));
+        matrix.diagonal = (0..n).map(diagonal).collect();
+        (matrix, dense)
+    }
+
+    /// A tree whose children come before their parents: the blocks below the diagonal, sorted by row.
+    pub fn tree(parents: &[prop::sample::Index]) -> Vec<(u32, u32)> {
+        let n = parents.len() + 1;
+        let parent = |(child, index): (usize, &prop::sample::Index)| {
+            ((child + 1 + index.index(n - child - 1)) as u32, child as u32)
+        };
+        let mut pairs: Vec<_> = parents.iter().enumerate().map(parent).collect();
+        pairs.sort_unstable();
+        pairs
+    }
+
+    pub fn entries(n: usize) -> Vec<Entry<D>> {
+        (0..n).map(|i| std::array::from_fn(|j| 1.0 + (i * D + j) as f64 * 0.37)).collect()
+    }
+
+    pub fn dense_product(dense: &[Vec<f64>], x: &[Entry<D>]) -> Vec<f64> {
+        dense.iter().map(|row| row.iter().zip(x.as_flattened()).map(|(a, x)| a * x).sum()).collect()
+    }
+
+    pub fn largest_difference(a: &[Entry<D>], b: &[f64]) -> f64 {
+        a.as_flattened().iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    proptest! {
+        #[test]
+        fn the_sparse_product_is_the_dense_one(
+            wanted in prop::collection::btree_set((1u32..8, 0u32..7), 0..20),
+            numbers in prop::collection::vec(-1.0..1.0f64, 40),
+        ) {
+            let n = 8;
+            let pairs: Vec<_> = wanted.into_iter().filter(|(row, column)| column < row).collect();
+            let (matrix, dense) = matrix(n, &pairs, &numbers);
+            let x = entries(n);
+            let mut product = vec![[0.0; D]; n];
+            matrix.multiply(&x, &mut product);
+            prop_assert!(largest_difference(&product, &dense_product(&dense, &x)) < 1e-12);
+        }
+    }
+}
