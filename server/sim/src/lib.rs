@@ -18,9 +18,11 @@
 
 pub mod collide;
 pub mod dof;
+mod eigen;
 mod error;
 pub mod integrate;
 mod island;
+pub mod mass;
 pub mod potential;
 mod settings;
 mod state;

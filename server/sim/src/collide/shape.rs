@@ -86,37 +86,6 @@ impl Shape {
         }
     }
 
-    /// Principal moments of inertia of the homogeneous solid of `mass` kg, kg m². The extrusion of a hull is left out.
-    ///
-    /// A half-space has none: zero. Hulls answer the moments about their own axes, products of inertia neglected.
-    pub fn inertia(&self, mass: f64) -> DVec3 {
-        match *self {
-            Self::HalfSpace { .. } => DVec3::ZERO,
-            Self::Ball { radius } => DVec3::splat(0.4 * mass * radius * radius),
-            Self::Box { half } => {
-                let s = half * half * (mass / 3.0);
-                DVec3::new(s.y + s.z, s.x + s.z, s.x + s.y)
-            }
-            Self::Capsule { half_length: h, radius: r } => {
-                // A cylinder of length 2h and two half balls, by volume.
-                let ball = mass * (4.0 / 3.0 * r) / (2.0 * h + 4.0 / 3.0 * r);
-                let rod = mass - ball;
-                let along = rod * r * r / 2.0 + ball * 0.4 * r * r;
-                let across = rod * (r * r / 4.0 + h * h / 3.0) + ball * (0.4 * r * r + h * h + 0.75 * r * h);
-                DVec3::new(along, across, across)
-            }
-            Self::Cylinder { half_length: h, radius: r, .. } => {
-                let across = mass * (r * r / 4.0 + h * h / 3.0);
-                DVec3::new(across, across, mass * r * r / 2.0)
-            }
-            Self::Hull { .. } => self.parry().map_or(DVec3::ZERO, |hull| {
-                let unit = hull.mass_properties(1.0);
-                let tensor = unit.reconstruct_inertia_matrix() * (mass * unit.inv_mass);
-                DVec3::new(tensor.x_axis.x, tensor.y_axis.y, tensor.z_axis.z)
-            }),
-        }
-    }
-
     /// Axis in the body's frame about which the shape may spin without moving its surface. A ball has every axis, and its
     /// contacts' arms lie along their normals anyway.
     pub(crate) fn revolution_axis(&self) -> Option<DVec3> {
