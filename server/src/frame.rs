@@ -77,7 +77,9 @@ impl Frame {
         self.dof.heads.clear();
         self.dof.numbers.clear();
         for slice in world.slices() {
-            self.dof.push(slice.serial, kind_on_wire(slice.kind), slice.q, slice.v);
+            if let Some(kind) = kind_on_wire(slice.kind) {
+                self.dof.push(slice.serial, kind, slice.q, slice.v);
+            }
         }
     }
 
@@ -113,10 +115,12 @@ impl Dof {
     }
 }
 
-fn kind_on_wire(kind: DofKind) -> u8 {
+/// What the wire calls a kind; `None` for those that it does not carry yet, which no arena has.
+fn kind_on_wire(kind: DofKind) -> Option<u8> {
     match kind {
-        DofKind::Particle => slices::KIND_PARTICLE,
-        DofKind::RigidBody => slices::KIND_RIGID_BODY,
+        DofKind::Particle => Some(slices::KIND_PARTICLE),
+        DofKind::RigidBody => Some(slices::KIND_RIGID_BODY),
+        _ => None,
     }
 }
 

@@ -35,6 +35,12 @@ pub enum TraceError {
         /// At this one.
         now: usize,
     },
+    /// The file format has a record for every point.
+    #[error("a trace holds particles, rigid bodies and points; {kind:?} is none of them")]
+    NoPoints {
+        /// What there is.
+        kind: DofKind,
+    },
     /// The disk says no.
     #[error("{file}: {reason}")]
     Unwritable {
@@ -66,13 +72,24 @@ impl Trace {
         }
         for slice in world.slices() {
             let (q, v) = (slice.q, slice.v);
-            let (rotation, spin) = match slice.kind {
-                DofKind::RigidBody => ([q[6], q[3], q[4], q[5]], [v[3], v[4], v[5]]),
-                DofKind::Particle => ([1.0, 0.0, 0.0, 0.0], [0.0; 3]),
-            };
-            for numbers in [&q[..3], &rotation, &v[..3], &spin] {
-                self.states.write(numbers)?;
+            match slice.kind {
+                DofKind::RigidBody => self.record_point(q, &[q[6], q[3], q[4], q[5]], v, &v[3..])?,
+                // Everything else whose numbers are points leaves a record for each of them.
+                DofKind::Particle | DofKind::Natural | DofKind::FiniteElements | DofKind::Lattice => {
+                    for (q, v) in q.chunks_exact(3).zip(v.chunks_exact(3)) {
+                        self.record_point(q, &[1.0, 0.0, 0.0, 0.0], v, &[0.0; 3])?;
+                    }
+                }
+                DofKind::Articulated | DofKind::Own(_) => return Err(TraceError::NoPoints { kind: slice.kind }),
             }
+        }
+        Ok(())
+    }
+
+    /// Position, quaternion w x y z, velocity, angular velocity.
+    fn record_point(&mut self, q: &[f64], rotation: &[f64], v: &[f64], spin: &[f64]) -> Result<(), TraceError> {
+        for numbers in [&q[..3], rotation, &v[..3], spin] {
+            self.states.write(numbers)?;
         }
         Ok(())
     }

@@ -114,8 +114,8 @@ impl Scene {
 
     fn add_ball(&mut self, line: &Line) -> Result<Result<(), SimError>, SceneError> {
         let [i, j, ax, ay, az, bx, by, bz] = line.numbers()?;
-        let a = Anchor { body: self.body(i, line)?, point: DVec3::new(ax, ay, az) };
-        let b = Anchor { body: self.body(j, line)?, point: DVec3::new(bx, by, bz) };
+        let a = Anchor { body: self.body(i, line)?, part: 0, point: DVec3::new(ax, ay, az) };
+        let b = Anchor { body: self.body(j, line)?, part: 0, point: DVec3::new(bx, by, bz) };
         Ok(self.world.add_ball_joint(BallJointDesc { a, b }).map(|_| ()))
     }
 

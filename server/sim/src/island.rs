@@ -63,8 +63,22 @@ impl Islands {
         self.touch(a);
         self.touch(b);
         self.couplings.push((a.min(b), a.max(b)));
+        self.unite(a, b);
+    }
+
+    /// A potential acts between everything of `near` and of `far`, within each of them too.
+    pub fn couple_all(&mut self, near: &[u32], far: &[u32]) {
+        let all = || near.iter().chain(far).copied().enumerate();
+        for (i, a) in all() {
+            self.touch(a);
+            all().take(i).filter(|&(_, b)| a != b).for_each(|(_, b)| self.couple(a, b));
+        }
+    }
+
+    /// `a` and `b` are in one island, though nothing may couple them.
+    pub fn unite(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
-        // The smaller root wins, so that islands are numbered by their first body.
+        // The smaller root wins, so that islands are numbered by their first block.
         self.parent[a.max(b) as usize] = a.min(b);
     }
 

@@ -16,6 +16,7 @@
 //! Conventions: SI units, f64, right-handed, y up; quaternions turn body axes into world axes; angular velocities are in
 //! world axes; a half-space's normal points out of the ground.
 
+pub mod autodiff;
 pub mod collide;
 pub mod dof;
 mod eigen;
@@ -29,7 +30,7 @@ mod state;
 mod world;
 
 pub use collide::{Collider, ContactView, Shape, StaticDesc, StaticId};
-pub use dof::{BodyId, DofKind, ParticleDesc, RigidBodyDesc};
+pub use dof::{BodyId, Dof, DofKind, FigureDesc, Frame, PartCollider, PartPoint, ParticleDesc, RigidBodyDesc};
 pub use error::SimError;
 pub use glam::{DMat3, DQuat, DVec3};
 pub use integrate::StepReport;

@@ -10,17 +10,17 @@ use std::ops::Range;
 pub(crate) struct Slice {
     q_start: u32,
     v_start: u32,
-    q_len: u8,
-    v_len: u8,
+    q_len: u32,
+    v_len: u32,
 }
 
 impl Slice {
     fn q(self) -> Range<usize> {
-        self.q_start as usize..self.q_start as usize + usize::from(self.q_len)
+        self.q_start as usize..(self.q_start + self.q_len) as usize
     }
 
     fn v(self) -> Range<usize> {
-        self.v_start as usize..self.v_start as usize + usize::from(self.v_len)
+        self.v_start as usize..(self.v_start + self.v_len) as usize
     }
 }
 
@@ -36,13 +36,13 @@ pub(crate) struct State {
 
 impl State {
     /// A zeroed slice of `q_len` positions and `v_len` rates.
-    pub fn allocate(&mut self, q_len: u8, v_len: u8) -> Slice {
+    pub fn allocate(&mut self, q_len: u32, v_len: u32) -> Slice {
         if let Some(i) = self.free.iter().position(|s| (s.q_len, s.v_len) == (q_len, v_len)) {
             return self.free.swap_remove(i);
         }
         let (q_start, v_start) = (self.q.len() as u32, self.v.len() as u32);
-        self.q.resize(self.q.len() + usize::from(q_len), 0.0);
-        self.v.resize(self.v.len() + usize::from(v_len), 0.0);
+        self.q.resize(self.q.len() + q_len as usize, 0.0);
+        self.v.resize(self.v.len() + v_len as usize, 0.0);
         Slice { q_start, v_start, q_len, v_len }
     }
 

@@ -4,9 +4,12 @@
 use glam::{DQuat, DVec3};
 use slotmap::SlotMap;
 
-use crate::collide::{ContactView, Detector, Moving, Partner, StaticDesc, StaticId};
-use crate::dof::{self, ABSENT, Body, BodyId, DofKind, ParticleDesc, Pose, RigidBodyDesc, Twist, particle, rigid_body};
-use crate::error::{SimError, require_rotation, require_vector};
+use crate::collide::{Collider, ContactView, Detector, Moving, Partner, StaticDesc, StaticId};
+use crate::dof::{
+    self, ABSENT, Body, BodyId, DofKind, FigureBody, FigureDesc, Frame, LocalState, PartPoint, ParticleDesc, Placed,
+    Pose, RigidBodyDesc, Twist, particle, rigid_body,
+};
+use crate::error::{SimError, require, require_rotation, require_vector};
 use crate::integrate::{Integrator, Scene, StepReport};
 use crate::potential::{
     Anchor, AxleControl, AxleDesc, AxleId, BallJoint, BallJointDesc, BallJointId, PdControl, PdDesc, PdGains, PdId,
@@ -22,6 +25,8 @@ pub struct World {
     bodies: SlotMap<BodyId, Body>,
     /// All bodies, in order of serial.
     order: Vec<BodyId>,
+    /// All colliders of bodies, in order of serial.
+    placed: Vec<Placed>,
     serials: u32,
     potentials: Potentials,
     detector: Detector,
@@ -83,6 +88,7 @@ impl World {
             state: State::default(),
             bodies: SlotMap::with_key(),
             order: Vec::new(),
+            placed: Vec::new(),
             serials: 0,
             potentials: Potentials::default(),
             detector: Detector::default(),
@@ -124,6 +130,29 @@ impl World {
         Ok(id)
     }
 
+    /// Adds a body of a general kind.
+    ///
+    /// # Errors
+    /// [`SimError`] naming the value that is out of range.
+    pub fn add_figure(&mut self, desc: FigureDesc) -> Result<BodyId, SimError> {
+        desc.validate()?;
+        let rates = desc.v.len() as u32;
+        let (kind, q, v) = (desc.dof.kind(), desc.q.clone(), desc.v.clone());
+        let figure = FigureBody::new(desc);
+        let id = self.add_body(kind, (q.len() as u32, rates), figure.mass, DVec3::ZERO, None);
+        for (index, part) in (0..).zip(&figure.colliders) {
+            // The first collider is found under the body's own serial.
+            let serial = self.serials - u32::from(index == 0);
+            self.serials = serial + 1;
+            self.placed.push(Placed { serial, body: id, at: part.at, index });
+        }
+        let body = &mut self.bodies[id];
+        body.figure = Some(figure);
+        self.state.q_mut(body.slice).copy_from_slice(&q);
+        self.state.v_mut(body.slice).copy_from_slice(&v);
+        Ok(id)
+    }
+
     /// Removes a body with every potential and contact that it has. Answers whether there was one.
     pub fn remove_body(&mut self, id: BodyId) -> bool {
         let Some(body) = self.bodies.remove(id) else { return false };
@@ -131,25 +160,45 @@ impl World {
         self.order.retain(|&other| other != id);
         self.potentials.remove_body(id);
         self.detector.forget(body.serial);
+        let Self { placed, detector, .. } = self;
+        placed.iter().filter(|placed| placed.body == id).for_each(|placed| detector.forget_contacts(placed.serial));
+        placed.retain(|placed| placed.body != id);
         true
     }
 
     fn add_body(
         &mut self,
         kind: DofKind,
-        size: (u8, u8),
+        size: (u32, u32),
         mass: f64,
         inertia: DVec3,
-        collider: Option<crate::Collider>,
+        collider: Option<Collider>,
     ) -> BodyId {
         let (slice, serial) = (self.state.allocate(size.0, size.1), self.serials);
         self.serials += 1;
         let (force, torque, impulse, index) = (DVec3::ZERO, DVec3::ZERO, Twist::REST, ABSENT);
         let (is_wheel, quarantined) = (false, false);
-        let body =
-            Body { kind, slice, serial, mass, inertia, collider, force, torque, impulse, index, is_wheel, quarantined };
-        let id = self.bodies.insert(body);
+        let (has_collider, figure) = (collider.is_some(), None);
+        let id = self.bodies.insert(Body {
+            kind,
+            slice,
+            serial,
+            mass,
+            inertia,
+            collider,
+            figure,
+            force,
+            torque,
+            impulse,
+            index,
+            is_wheel,
+            quarantined,
+        });
         self.order.push(id);
+        if has_collider {
+            let at = PartPoint { part: 0, point: DVec3::ZERO };
+            self.placed.push(Placed { serial, body: id, at, index: 0 });
+        }
         id
     }
 
@@ -276,6 +325,13 @@ impl World {
             if body.kind == DofKind::Particle && anchor.point != DVec3::ZERO {
                 return Err(SimError::Unusable { what: "a particle has no point but its own: use 0, 0, 0" });
             }
+            let parts = body.figure.as_ref().map_or(1, |figure| figure.dof.parts());
+            require(
+                anchor.part < parts,
+                "part of an anchor",
+                f64::from(anchor.part),
+                "the index of one of the body's parts",
+            )?;
         }
         if a.body == b.body {
             return Err(SimError::Unusable { what: "both ends are at the same body" });
@@ -327,7 +383,8 @@ impl World {
     pub fn set_pose(&mut self, id: BodyId, position: DVec3, rotation: DQuat) -> Result<(), SimError> {
         require_vector(position, "position")?;
         require_rotation(rotation, "rotation")?;
-        let body = self.bodies.get_mut(id).ok_or(SimError::Gone { what: "the body" })?;
+        let body = self.simple_body(id)?;
+        let body = &mut self.bodies[body];
         body.set_pose(Pose { position, rotation: rotation.normalize() }, &mut self.state);
         body.quarantined = false;
         body.impulse = Twist::REST;
@@ -343,7 +400,7 @@ impl World {
     pub fn set_velocity(&mut self, id: BodyId, linear: DVec3, angular: DVec3) -> Result<(), SimError> {
         require_vector(linear, "velocity")?;
         require_vector(angular, "angular_velocity")?;
-        let body = self.bodies.get(id).ok_or(SimError::Gone { what: "the body" })?;
+        let body = &self.bodies[self.simple_body(id)?];
         body.set_twist(Twist { linear, angular }, &mut self.state);
         Ok(())
     }
@@ -355,10 +412,61 @@ impl World {
     pub fn apply_force(&mut self, id: BodyId, force: DVec3, at: DVec3) -> Result<(), SimError> {
         require_vector(force, "force")?;
         require_vector(at, "at")?;
-        let body = self.bodies.get_mut(id).ok_or(SimError::Gone { what: "the body" })?;
+        let id = self.simple_body(id)?;
+        let body = &mut self.bodies[id];
         let arm = at - body.pose(&self.state).position;
         body.force += force;
         body.torque += arm.cross(force);
+        Ok(())
+    }
+
+    /// A particle or rigid body.
+    fn simple_body(&self, id: BodyId) -> Result<BodyId, SimError> {
+        let body = self.bodies.get(id).ok_or(SimError::Gone { what: "the body" })?;
+        match body.figure {
+            None => Ok(id),
+            Some(_) => Err(SimError::Unusable { what: "this is for particles and rigid bodies alone" }),
+        }
+    }
+
+    /// The frame at a material point: where it is and how it moves. `None` where there is no such body or part.
+    pub fn frame(&self, id: BodyId, at: PartPoint) -> Option<Frame<f64>> {
+        let body = self.bodies.get(id)?;
+        let parts = body.figure.as_ref().map_or(1, |figure| figure.dof.parts());
+        (at.part < parts).then(|| body.frame(at, &self.state))
+    }
+
+    /// A body's positions and rates.
+    pub fn slice(&self, id: BodyId) -> Option<SliceView<'_>> {
+        let body = self.bodies.get(id)?;
+        let (q, v) = (self.state.q(body.slice), self.state.v(body.slice));
+        Some(SliceView { serial: body.serial, kind: body.kind, q, v })
+    }
+
+    /// Sets positions and rates of a body of a general kind; its contacts of the last tick are forgotten, and so is a
+    /// quarantine.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, numbers that are too many or too few, or a body that is gone.
+    pub fn set_slice(&mut self, id: BodyId, q: &[f64], v: &[f64]) -> Result<(), SimError> {
+        let body = self.bodies.get_mut(id).ok_or(SimError::Gone { what: "the body" })?;
+        let Some(figure) = &mut body.figure else {
+            return Err(SimError::Unusable { what: "particles and rigid bodies have set_pose and set_velocity" });
+        };
+        let lengths = (self.state.q(body.slice).len(), self.state.v(body.slice).len());
+        if (q.len(), v.len()) != lengths {
+            return Err(SimError::Unusable { what: "q and v must be as long as the body's" });
+        }
+        for (numbers, what) in [(q, "q"), (v, "v")] {
+            numbers.iter().try_for_each(|&x| require(x.abs() < 1e9, what, x, "finite and below 1e9"))?;
+        }
+        figure.change.fill(0.0);
+        body.quarantined = false;
+        self.state.q_mut(body.slice).copy_from_slice(q);
+        self.state.v_mut(body.slice).copy_from_slice(v);
+        for placed in self.placed.iter().filter(|placed| placed.body == id) {
+            self.detector.forget_contacts(placed.serial);
+        }
         Ok(())
     }
 
@@ -374,11 +482,7 @@ impl World {
 
     /// All slices of Q and Q', in order of serial.
     pub fn slices(&self) -> impl Iterator<Item = SliceView<'_>> {
-        self.order.iter().map(|&id| {
-            let body = &self.bodies[id];
-            let (q, v) = (self.state.q(body.slice), self.state.v(body.slice));
-            SliceView { serial: body.serial, kind: body.kind, q, v }
-        })
+        self.order.iter().filter_map(|&id| self.slice(id))
     }
 
     /// Hash over every bit of Q and Q'.
@@ -390,10 +494,14 @@ impl World {
     pub fn energy(&self) -> Energy {
         let mut energy = Energy::default();
         for body in self.bodies.values() {
-            let twist = body.twist(&self.state);
-            let spin = body.spin_momentum(&self.state);
-            energy.kinetic += 0.5 * (body.mass * twist.linear.length_squared() + spin.dot(twist.angular));
-            energy.gravitational -= body.mass * self.settings.gravity.dot(body.pose(&self.state).position);
+            let motion = body.motion(&self.state);
+            energy.kinetic += motion.energy;
+            energy.gravitational -= self.settings.gravity.dot(motion.moment);
+            if let Some(figure) = &body.figure {
+                let (q, v) = (self.state.q(body.slice), self.state.v(body.slice));
+                let state = LocalState { dt: self.settings.dt, q0: q, v0: v, q1: q, v1: v };
+                energy.elastic += figure.dof.energy(&state, &mut vec![0.0; v.len()]);
+            }
         }
         for spring in self.potentials.springs.values() {
             let stretch = (self.point(spring.b) - self.point(spring.a)).length() - spring.rest_length;
@@ -406,27 +514,43 @@ impl World {
     pub fn momentum(&self) -> Momentum {
         let mut momentum = Momentum::default();
         for body in self.bodies.values() {
-            let linear = body.mass * body.twist(&self.state).linear;
-            momentum.linear += linear;
-            momentum.angular += body.pose(&self.state).position.cross(linear) + body.spin_momentum(&self.state);
+            let motion = body.motion(&self.state);
+            momentum.linear += motion.momentum;
+            momentum.angular += motion.angular_momentum;
         }
         momentum
     }
 
     fn point(&self, anchor: Anchor) -> DVec3 {
         let body = anchor.body.and_then(|id| self.bodies.get(id));
-        body.map_or(anchor.point, |body| body.pose(&self.state).point(anchor.point))
+        let at = PartPoint { part: anchor.part, point: anchor.point };
+        body.map_or(anchor.point, |body| body.frame(at, &self.state).position.into())
     }
 
     // --- stages ----------------------------------------------------------------------------------------------------
 
     /// Stage 2: finds contacts at Q0.
     pub fn detect_collisions(&mut self) {
-        let Self { bodies, state, order, detector, settings, .. } = self;
-        detector.detect(order, settings, |id| {
-            let body = &bodies[id];
-            let collider = body.collider.as_ref().filter(|_| !body.quarantined)?;
-            Some(Moving { serial: body.serial, collider, pose: body.pose(state), twist: body.twist(state) })
+        let Self { bodies, state, placed, detector, settings, .. } = self;
+        detector.detect(placed, settings, |&Placed { serial, body, at, index }| {
+            let body = &bodies[body];
+            if body.quarantined {
+                return None;
+            }
+            let owner = body.serial;
+            if let Some(figure) = &body.figure {
+                let (q, v) = (state.q(body.slice), state.v(body.slice));
+                let (pose, twist) = (figure.pose(at, q, v), figure.dof.frame(at, q, v).twist());
+                return Some(Moving {
+                    serial,
+                    owner,
+                    collider: &figure.colliders[index as usize].collider,
+                    pose,
+                    twist,
+                });
+            }
+            let collider = body.collider.as_ref()?;
+            Some(Moving { serial, owner, collider, pose: body.pose(state), twist: body.twist(state) })
         });
     }
 
@@ -437,6 +561,7 @@ impl World {
             state: &mut self.state,
             bodies: &mut self.bodies,
             order: &self.order,
+            placed: &self.placed,
             potentials: &mut self.potentials,
             contacts: &mut self.detector.contacts,
         };
@@ -468,8 +593,9 @@ impl World {
         })
     }
 
+    /// The body that a collider belongs to.
     fn body_of(&self, serial: u32) -> Option<BodyId> {
-        let place = self.order.binary_search_by_key(&serial, |&id| self.bodies[id].serial).ok()?;
-        Some(self.order[place])
+        let place = self.placed.binary_search_by_key(&serial, |placed| placed.serial).ok()?;
+        Some(self.placed[place].body)
     }
 }

@@ -13,7 +13,7 @@ use glam::{DQuat, DVec3};
 
 pub use shape::{Collider, HULL_POINTS_MAX, Shape};
 
-use crate::dof::{BodyId, Pose, Twist};
+use crate::dof::{BodyId, Placed, Pose, Twist};
 use crate::error::{SimError, require_rotation, require_vector};
 use crate::settings::Settings;
 use broad_phase::{Bounds, BroadPhase};
@@ -57,7 +57,10 @@ pub struct ContactView {
 /// What detection sees of a body.
 #[derive(Clone, Copy)]
 pub(crate) struct Moving<'a> {
+    /// Of the collider.
     pub serial: u32,
+    /// Serial of the body that it is on.
+    pub owner: u32,
     pub collider: &'a Collider,
     pub pose: Pose,
     pub twist: Twist,
@@ -153,6 +156,10 @@ impl Detector {
         }
     }
 
+    fn excludes(&self, a: u32, b: u32) -> bool {
+        self.excluded.binary_search(&(a.min(b), a.max(b))).is_ok()
+    }
+
     /// Forgets a body: its contacts and exclusions.
     pub fn forget(&mut self, serial: u32) {
         self.excluded.retain(|&(a, b)| a != serial && b != serial);
@@ -165,21 +172,21 @@ impl Detector {
         self.narrow_phase.forget(serial);
     }
 
-    /// Finds all contact points of `bodies`, which are in order of serial. `look` answers `None` for what does not
+    /// Finds all contact points of the colliders `bodies`, which are in order of serial. `look` answers `None` for what does not
     /// collide.
-    pub fn detect<'a>(&mut self, bodies: &[BodyId], settings: &Settings, look: impl Fn(BodyId) -> Option<Moving<'a>>) {
+    pub fn detect<'a>(&mut self, bodies: &[Placed], settings: &Settings, look: impl Fn(&Placed) -> Option<Moving<'a>>) {
         self.bounds.clear();
-        let bounds = |&id: &BodyId| look(id).map_or(Bounds::EMPTY, |body| swept_bounds(&body, settings));
+        let bounds = |placed: &Placed| look(placed).map_or(Bounds::EMPTY, |body| swept_bounds(&body, settings));
         self.bounds.extend(bodies.iter().map(bounds));
         self.broad_phase.pairs(&self.bounds, &mut self.pairs);
         self.narrow_phase.begin();
         let mut pairs = self.pairs.iter().peekable();
-        for (i, &id) in (0..).zip(bodies) {
+        for (i, placed) in (0..).zip(bodies) {
             while pairs.next_if(|&&(a, _)| a < i).is_some() {}
-            let Some(body) = &look(id) else { continue };
+            let Some(body) = &look(placed) else { continue };
             while let Some(&(_, j)) = pairs.next_if(|&&(a, _)| a == i) {
-                let Some(other) = &look(bodies[j as usize]) else { continue };
-                if self.excluded.binary_search(&(body.serial, other.serial)).is_err() {
+                let Some(other) = &look(&bodies[j as usize]) else { continue };
+                if body.owner != other.owner && !self.excludes(body.owner, other.owner) {
                     self.narrow_phase.bodies(body, other, settings);
                 }
             }

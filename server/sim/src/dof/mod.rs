@@ -3,10 +3,21 @@
 //! A kind is Kinematics (how the slice moves over a tick), Inertia (its mass as the integrator sees it) and Potentials
 //! (what pushes it; those live in [`potential`](crate::potential)). One file a kind.
 
+mod figure;
+mod frame;
+mod interface;
 pub(crate) mod particle;
 pub(crate) mod rigid_body;
 
 use glam::{DMat3, DQuat, DVec3};
+
+pub(crate) use figure::FigureBody;
+pub use figure::{FigureDesc, PartCollider};
+pub use frame::Frame;
+pub use interface::{
+    BLOCK_RATES_MAX, BlockSize, Columns, Dof, Inertia, LocalState, PartInertia, PartPoint, PointMasses, PointRod,
+    RateBlock,
+};
 
 use crate::collide::Collider;
 use crate::error::{LARGEST, SimError, require, require_rotation, require_vector};
@@ -24,6 +35,16 @@ pub enum DofKind {
     Particle,
     /// Q = centre of mass and unit quaternion x y z w; Q' = velocity and angular velocity.
     RigidBody,
+    /// Q = a root and joint coordinates; 15 numbers for a sheep.
+    Articulated,
+    /// Q = points in space (natural Cartesian coordinates), three numbers each.
+    Natural,
+    /// Q = nodes of a mesh of tetrahedra, three numbers each.
+    FiniteElements,
+    /// Q = nodes of a free-form lattice, three numbers each.
+    Lattice,
+    /// A game's own kind, by its name.
+    Own(&'static str),
 }
 
 /// A rigid body to be added.
@@ -78,6 +99,8 @@ pub(crate) struct Body {
     /// Principal moments, kg m²; zero for a particle.
     pub inertia: DVec3,
     pub collider: Option<Collider>,
+    /// What a body of a general kind is.
+    pub figure: Option<FigureBody>,
     /// Force and torque about the centre of mass asked for by code, for the coming tick, N and N m.
     pub force: DVec3,
     pub torque: DVec3,
@@ -89,6 +112,18 @@ pub(crate) struct Body {
     pub is_wheel: bool,
     /// Its state became non-finite: it stays where it last was sane, outside dynamics and collision.
     pub quarantined: bool,
+}
+
+/// A collider on a body.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Placed {
+    /// Counts up with every body and every further collider of a body; never used twice.
+    pub serial: u32,
+    pub body: BodyId,
+    /// The collider's origin; axes are the part's.
+    pub at: PartPoint,
+    /// Among the figure's colliders.
+    pub index: u32,
 }
 
 /// Index of a body that does not take part.
@@ -123,6 +158,14 @@ impl Pose {
     /// World position of a point of the body.
     pub fn point(self, local: DVec3) -> DVec3 {
         self.position + self.rotation * local
+    }
+
+    /// Writes a slice of Q; of a particle's, the position alone.
+    pub fn write(self, q: &mut [f64]) {
+        q[..3].copy_from_slice(&self.position.to_array());
+        if let Some(rotation) = q.get_mut(3..7) {
+            rotation.copy_from_slice(&self.rotation.to_array());
+        }
     }
 }
 
@@ -174,6 +217,18 @@ impl Node {
         Twist { linear, angular: self.target.angular + self.impulse.angular }
     }
 
+    /// Frame at the start of the tick.
+    pub fn start_frame(&self) -> Frame<f64> {
+        let Pose { position, rotation } = self.start;
+        Frame::new(position, DMat3::from_quat(rotation), self.before.linear, self.before.angular)
+    }
+
+    /// Frame after a tick of `dt` with twist `u`.
+    pub fn frame(&self, u: Twist, dt: f64) -> Frame<f64> {
+        let Pose { position, rotation } = self.pose(u, dt);
+        Frame::new(position, DMat3::from_quat(rotation), u.linear, u.angular)
+    }
+
     /// Pose after a tick of `dt` with twist `u`.
     pub fn pose(&self, u: Twist, dt: f64) -> Pose {
         let position = self.start.position + dt * u.linear;
@@ -188,45 +243,83 @@ impl Node {
 }
 
 impl Body {
-    /// The body's start of a tick.
+    /// The start of a tick of a particle or rigid body.
     pub fn node(&self, state: &State, dt: f64, gravity: DVec3) -> Node {
         let (q, v) = (state.q(self.slice), state.v(self.slice));
         match self.kind {
             DofKind::Particle => particle::node(self, q, v, dt, gravity),
-            DofKind::RigidBody => rigid_body::node(self, q, v, dt, gravity),
+            _ => rigid_body::node(self, q, v, dt, gravity),
         }
     }
 
-    /// Writes the state after a tick with twist `u` at its end.
+    /// Writes the state of a particle or rigid body after a tick with twist `u` at its end.
     pub fn advance(&self, node: &Node, u: Twist, dt: f64, state: &mut State) {
         match self.kind {
             DofKind::Particle => particle::advance(self, node, u, dt, state),
-            DofKind::RigidBody => rigid_body::advance(self, node, u, dt, state),
+            _ => rigid_body::advance(self, node, u, dt, state),
         }
     }
 
+    /// Writes the state of a figure at the end of a tick.
+    pub fn advance_figure(&mut self, q1: &[f64], v1: &[f64], state: &mut State) {
+        let Some(figure) = &mut self.figure else { return };
+        for ((change, v1), v0) in figure.change.iter_mut().zip(v1).zip(state.v(self.slice)) {
+            *change = v1 - v0;
+        }
+        state.q_mut(self.slice).copy_from_slice(q1);
+        state.v_mut(self.slice).copy_from_slice(v1);
+    }
+
+    /// Takes the body out of dynamics and collision: at rest, where `place` puts it.
+    pub fn quarantine(&mut self, state: &mut State, place: impl FnOnce(&mut [f64])) {
+        self.quarantined = true;
+        place(state.q_mut(self.slice));
+        state.v_mut(self.slice).fill(0.0);
+        self.impulse = Twist::REST;
+        if let Some(figure) = &mut self.figure {
+            figure.change.fill(0.0);
+        }
+    }
+
+    /// Pose; of a figure's first part.
     pub fn pose(&self, state: &State) -> Pose {
-        match self.kind {
-            DofKind::Particle => Pose { position: particle::position(state.q(self.slice)), ..Pose::IDENTITY },
-            DofKind::RigidBody => rigid_body::pose(state.q(self.slice)),
+        let q = state.q(self.slice);
+        match (&self.figure, self.kind) {
+            (Some(figure), _) => figure.pose(PartPoint { part: 0, point: DVec3::ZERO }, q, state.v(self.slice)),
+            (None, DofKind::Particle) => Pose { position: particle::position(q), ..Pose::IDENTITY },
+            (None, _) => rigid_body::pose(q),
         }
     }
 
+    /// Twist; of a figure's first part.
     pub fn twist(&self, state: &State) -> Twist {
-        match self.kind {
-            DofKind::Particle => Twist { linear: particle::velocity(state.v(self.slice)), angular: DVec3::ZERO },
-            DofKind::RigidBody => rigid_body::twist(state.v(self.slice)),
+        let v = state.v(self.slice);
+        match (&self.figure, self.kind) {
+            (Some(figure), _) => {
+                figure.dof.frame(PartPoint { part: 0, point: DVec3::ZERO }, state.q(self.slice), v).twist()
+            }
+            (None, DofKind::Particle) => Twist { linear: particle::velocity(v), angular: DVec3::ZERO },
+            (None, _) => rigid_body::twist(v),
         }
     }
 
+    /// The frame at a material point.
+    pub fn frame(&self, at: PartPoint, state: &State) -> Frame<f64> {
+        let (q, v) = (state.q(self.slice), state.v(self.slice));
+        if let Some(figure) = &self.figure {
+            return figure.dof.frame(at, q, v);
+        }
+        let (Pose { position, rotation }, twist) = (self.pose(state), self.twist(state));
+        let arm = rotation * at.point;
+        Frame::new(position + arm, DMat3::from_quat(rotation), twist.at(arm), twist.angular)
+    }
+
+    /// Moves a particle or rigid body.
     pub fn set_pose(&self, pose: Pose, state: &mut State) {
-        let q = state.q_mut(self.slice);
-        q[..3].copy_from_slice(&pose.position.to_array());
-        if self.kind == DofKind::RigidBody {
-            q[3..].copy_from_slice(&pose.rotation.to_array());
-        }
+        pose.write(state.q_mut(self.slice));
     }
 
+    /// Sets the velocities of a particle or rigid body.
     pub fn set_twist(&self, twist: Twist, state: &mut State) {
         let v = state.v_mut(self.slice);
         v[..3].copy_from_slice(&twist.linear.to_array());
@@ -240,16 +333,33 @@ impl Body {
         state.q(self.slice).iter().chain(state.v(self.slice)).all(|x| x.abs() < LARGEST)
     }
 
-    /// Angular momentum about the centre of mass, kg m²/s.
-    pub fn spin_momentum(&self, state: &State) -> DVec3 {
-        match self.kind {
-            DofKind::Particle => DVec3::ZERO,
-            DofKind::RigidBody => {
-                let rotation = self.pose(state).rotation;
-                rotation * (self.inertia * (rotation.inverse() * self.twist(state).angular))
-            }
+    /// Momentum, angular momentum about the origin, and kinetic energy.
+    pub fn motion(&self, state: &State) -> Motion {
+        if let Some(figure) = &self.figure {
+            return figure.motion(state.q(self.slice), state.v(self.slice));
         }
+        let (Pose { position, rotation }, Twist { linear, angular }) = (self.pose(state), self.twist(state));
+        let momentum = self.mass * linear;
+        let spin = match self.kind {
+            DofKind::Particle => DVec3::ZERO,
+            _ => rotation * (self.inertia * (rotation.inverse() * angular)),
+        };
+        let energy = 0.5 * (momentum.dot(linear) + spin.dot(angular));
+        Motion { momentum, angular_momentum: position.cross(momentum) + spin, energy, moment: self.mass * position }
     }
+}
+
+/// How a body moves as a whole.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Motion {
+    /// kg m/s.
+    pub momentum: DVec3,
+    /// About the origin, kg m²/s.
+    pub angular_momentum: DVec3,
+    /// Of motion and spin, J.
+    pub energy: f64,
+    /// Mass times centre of mass, kg m.
+    pub moment: DVec3,
 }
 
 fn validate_mass(mass: f64) -> Result<(), SimError> {

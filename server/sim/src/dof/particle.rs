@@ -6,7 +6,7 @@ use super::{Body, Node, Pose, Twist};
 use crate::state::State;
 
 /// Numbers in Q and in Q'.
-pub(crate) const SIZE: (u8, u8) = (3, 3);
+pub(crate) const SIZE: (u32, u32) = (3, 3);
 
 pub(super) fn position(q: &[f64]) -> DVec3 {
     DVec3::from_slice(q)

@@ -7,7 +7,7 @@ use super::{Body, Node, Pose, Twist};
 use crate::state::State;
 
 /// Numbers in Q and in Q'.
-pub(crate) const SIZE: (u8, u8) = (7, 6);
+pub(crate) const SIZE: (u32, u32) = (7, 6);
 
 /// Largest turn of one sub-step of the torque-free flow, rad: RK4 then keeps the energy of the `spin` scene to 1e-6.
 const FLOW_STEP: f64 = 0.1;

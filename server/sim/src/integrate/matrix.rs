@@ -4,8 +4,10 @@
 //! factorisations. Stored are the diagonal and the lower triangle, row by row, columns ascending.
 
 use super::block::{Block, Entry, multiply_add, transposed_multiply_add, zero};
-use super::problem::{Problem, Visitor};
-use crate::potential::{Candidate, FIXED, NodeIndex, PairBlocks, Term};
+use super::figure::{Figures, pulled_back};
+use super::problem::{Problem, Unknown, Visitor, pair};
+use crate::dof::{Columns, Frame};
+use crate::potential::{FIXED, FrameIndex, PairBlocks, Term};
 
 /// Marks a term without an off-diagonal block.
 const NONE: u32 = u32::MAX;
@@ -27,9 +29,11 @@ pub(super) struct Matrix<const D: usize> {
 impl<const D: usize> Matrix<D> {
     /// Finds the sparsity pattern of `problem`.
     pub fn analyse(&mut self, problem: &mut Problem) {
-        let n = problem.nodes.len();
+        let n = problem.len();
         self.pairs.clear();
-        problem.terms.visit(&mut Pairs { pairs: &mut self.pairs });
+        let Problem { terms, figures, .. } = problem;
+        terms.visit(&mut Pairs { blocks: n, figures, pairs: &mut self.pairs });
+        figures.couplings(&mut |a, b| self.pairs.push((a.max(b), a.min(b))));
         self.pairs.sort_unstable();
         self.pairs.dedup();
         self.rows.clear();
@@ -43,32 +47,33 @@ impl<const D: usize> Matrix<D> {
             self.rows[i + 1] += self.rows[i];
         }
         self.slots.clear();
-        problem.terms.visit(&mut Slots { rows: &self.rows, columns: &self.columns, slots: &mut self.slots });
+        terms.visit(&mut Slots { blocks: n, rows: &self.rows, columns: &self.columns, slots: &mut self.slots });
         self.diagonal.resize(n, zero());
         self.lower.resize(self.columns.len(), zero());
     }
 
-    /// Sums up M + dt² ∂²Φ at the problem's trial.
+    /// Sums up M + dt² ∂²Φ at the problem's candidate.
     pub fn assemble(&mut self, problem: &mut Problem) {
-        for (block, node) in self.diagonal.iter_mut().zip(&problem.nodes) {
-            *block = zero();
-            for (i, row) in block.iter_mut().enumerate() {
-                if i < 3 {
-                    row[i] = node.mass;
-                } else {
-                    // The inertia is symmetric: its columns are its rows.
-                    row[3..].copy_from_slice(&node.inertia.col(i - 3).to_array());
-                }
-            }
+        for (block, unknown) in self.diagonal.iter_mut().zip(&problem.unknowns) {
+            *block = inertia_block(unknown);
         }
         self.lower.fill(zero());
-        let candidate = Candidate { dt: problem.dt, trial: &problem.trial };
-        problem.terms.visit(&mut Assemble {
-            candidate,
-            diagonal: &mut self.diagonal,
-            lower: &mut self.lower,
-            slots: self.slots.iter(),
-        });
+        let Problem { dt, terms, figures, frames, .. } = problem;
+        let mut slots = std::mem::take(&mut self.slots);
+        terms.visit(&mut Assemble { dt: *dt, frames, figures, matrix: self, slots: slots.iter() });
+        std::mem::swap(&mut self.slots, &mut slots);
+        figures.assemble(*dt, frames, &mut |row, column, block| self.add(row, column, block, 1.0));
+    }
+
+    /// Adds the leading part of `factor` × `block` at (row, column), or its transpose where that is the stored half.
+    fn add(&mut self, row: u32, column: u32, block: &Block<6>, factor: f64) {
+        if row == column {
+            return add_scaled(&mut self.diagonal[row as usize], block, factor, false);
+        }
+        let (i, j) = (row.max(column), row.min(column));
+        if let Some(slot) = slot(&self.rows, &self.columns, (i, j)) {
+            add_scaled(&mut self.lower[slot as usize], block, factor, row < column);
+        }
     }
 
     /// y = A x.
@@ -90,22 +95,83 @@ impl<const D: usize> Matrix<D> {
     }
 }
 
-/// Row and column of the lower-triangle block between two bodies.
-fn place([a, b]: [NodeIndex; 2]) -> Option<(u32, u32)> {
-    (a != FIXED && b != FIXED).then(|| (a.max(b), a.min(b)))
+/// What a block of unknowns weighs by itself. A figure adds its inertia later; rates that a block does not have are held
+/// at zero by a unit mass.
+fn inertia_block<const D: usize>(unknown: &Unknown) -> Block<D> {
+    let mut block = zero();
+    for (i, row) in block.iter_mut().enumerate() {
+        match unknown {
+            Unknown::Body(node) if i < 3 => row[i] = node.mass,
+            // The inertia is symmetric: its columns are its rows.
+            Unknown::Body(node) => row[3..].copy_from_slice(&node.inertia.col(i - 3).to_array()),
+            Unknown::Rates(rates) => row[i] = if i < usize::from(rates.size) { 0.0 } else { 1.0 },
+        }
+    }
+    block
+}
+
+/// Place in `columns` of the block at (row, column), row > column.
+fn slot(rows: &[u32], columns: &[u32], (row, column): (u32, u32)) -> Option<u32> {
+    let (start, end) = (rows[row as usize], rows[row as usize + 1]);
+    let found = columns[start as usize..end as usize].binary_search(&column);
+    found.ok().map(|k| start + k as u32)
+}
+
+/// Row and column of the lower-triangle block between two frames that are blocks of unknowns themselves.
+fn place([a, b]: [FrameIndex; 2], blocks: usize) -> Option<(u32, u32)> {
+    let direct = (a as usize) < blocks && (b as usize) < blocks;
+    direct.then(|| (a.max(b), a.min(b)))
+}
+
+/// A frame that is a block of unknowns moves with it.
+const IDENTITY: Columns = {
+    let mut columns = [[0.0; 6]; 6];
+    let mut i = 0;
+    while i < 6 {
+        columns[i][i] = 1.0;
+        i += 1;
+    }
+    columns
+};
+
+/// Hands `each` every block that moves a frame, with the frame's derivatives.
+fn movers(figures: &Figures, blocks: usize, frame: FrameIndex, mut each: impl FnMut(u32, &Columns)) {
+    if (frame as usize) < blocks {
+        each(frame, &IDENTITY);
+    } else if frame != FIXED {
+        figures.influences(frame as usize - blocks).iter().for_each(|i| each(i.block, &i.columns));
+    }
 }
 
 struct Pairs<'a> {
+    blocks: usize,
+    figures: &'a Figures,
     pairs: &'a mut Vec<(u32, u32)>,
 }
 
 impl Visitor for Pairs<'_> {
     fn visit<T: Term>(&mut self, terms: &mut [T]) {
-        self.pairs.extend(terms.iter().filter_map(|term| place(term.nodes())));
+        for term in terms {
+            let frames = term.frames();
+            if let Some(pair) = place(frames, self.blocks) {
+                self.pairs.push(pair);
+                continue;
+            }
+            for (a, b) in [(0, 0), (0, 1), (1, 1)].map(|(i, j)| (frames[i], frames[j])) {
+                movers(self.figures, self.blocks, a, |i, _| {
+                    movers(self.figures, self.blocks, b, |j, _| {
+                        if i != j {
+                            self.pairs.push((i.max(j), i.min(j)));
+                        }
+                    });
+                });
+            }
+        }
     }
 }
 
 struct Slots<'a> {
+    blocks: usize,
     rows: &'a [u32],
     columns: &'a [u32],
     slots: &'a mut Vec<u32>,
@@ -114,38 +180,61 @@ struct Slots<'a> {
 impl Visitor for Slots<'_> {
     fn visit<T: Term>(&mut self, terms: &mut [T]) {
         for term in terms {
-            let slot = place(term.nodes()).and_then(|(row, column)| {
-                let (start, end) = (self.rows[row as usize], self.rows[row as usize + 1]);
-                let found = self.columns[start as usize..end as usize].binary_search(&column);
-                found.ok().map(|k| start + k as u32)
-            });
+            let slot = place(term.frames(), self.blocks).and_then(|place| slot(self.rows, self.columns, place));
             self.slots.push(slot.unwrap_or(NONE));
         }
     }
 }
 
 struct Assemble<'a, const D: usize> {
-    candidate: Candidate<'a>,
-    diagonal: &'a mut [Block<D>],
-    lower: &'a mut [Block<D>],
+    dt: f64,
+    frames: &'a [Frame<f64>],
+    figures: &'a Figures,
+    matrix: &'a mut Matrix<D>,
     slots: std::slice::Iter<'a, u32>,
 }
 
 impl<const D: usize> Visitor for Assemble<'_, D> {
     fn visit<T: Term>(&mut self, terms: &mut [T]) {
-        let factor = self.candidate.dt * self.candidate.dt;
-        for (term, &slot) in terms.iter().zip(&mut self.slots) {
-            let PairBlocks { aa, ab, bb } = term.hessian(&self.candidate);
-            let [a, b] = term.nodes();
+        let factor = self.dt * self.dt;
+        let blocks = self.matrix.diagonal.len();
+        for term in terms {
+            let slot = self.slots.next().copied().unwrap_or(NONE);
+            let hessian = term.hessian(self.dt, pair(self.frames, term));
+            let [a, b] = term.frames();
+            if [a, b].iter().any(|&frame| frame != FIXED && frame as usize >= blocks) {
+                self.add_pulled_back([a, b], &hessian, factor);
+                continue;
+            }
+            let PairBlocks { aa, ab, bb } = hessian;
             if a != FIXED {
-                add_scaled(&mut self.diagonal[a as usize], &aa, factor, false);
+                add_scaled(&mut self.matrix.diagonal[a as usize], &aa, factor, false);
             }
             if b != FIXED {
-                add_scaled(&mut self.diagonal[b as usize], &bb, factor, false);
+                add_scaled(&mut self.matrix.diagonal[b as usize], &bb, factor, false);
             }
             if slot != NONE {
-                add_scaled(&mut self.lower[slot as usize], &ab, factor, a < b);
+                add_scaled(&mut self.matrix.lower[slot as usize], &ab, factor, a < b);
             }
+        }
+    }
+}
+
+impl<const D: usize> Assemble<'_, D> {
+    /// Adds a term that acts on material points of figures: Jᵀ H J over all blocks that move them.
+    fn add_pulled_back(&mut self, [a, b]: [FrameIndex; 2], hessian: &PairBlocks, factor: f64) {
+        let Self { figures, matrix, .. } = self;
+        let blocks = matrix.diagonal.len();
+        let PairBlocks { aa, ab, bb } = hessian;
+        let ba = &std::array::from_fn(|i| std::array::from_fn(|j| ab[j][i]));
+        for (row, column, block) in [(a, a, aa), (a, b, ab), (b, a, ba), (b, b, bb)] {
+            movers(figures, blocks, row, |i, left| {
+                movers(figures, blocks, column, |j, right| {
+                    if i >= j {
+                        matrix.add(i, j, &pulled_back(left, block, right), factor);
+                    }
+                });
+            });
         }
     }
 }

@@ -7,6 +7,8 @@
 
 pub(crate) mod block;
 mod conjugate_gradient;
+pub(crate) mod figure;
+mod gather;
 mod line_search;
 mod matrix;
 mod newton;

@@ -6,9 +6,8 @@ use super::conjugate_gradient::ConjugateGradient;
 use super::line_search;
 use super::matrix::Matrix;
 use super::preconditioner::{IncompleteFactorization, Preconditioner};
-use super::problem::{Problem, entry_of};
+use super::problem::{Guess, Problem};
 use super::vector::{add_scaled, inner};
-use crate::dof::{Node, Twist};
 use crate::settings::SolverSettings;
 
 /// What solving an island took.
@@ -66,25 +65,18 @@ impl<const D: usize> Newton<D> {
     /// Starts at the cheapest, in incremental potential, of: the motion without potentials, last tick's motion, rest, and
     /// last tick's impulses once more. Answers the evaluations.
     fn guess(&mut self, problem: &mut Problem) -> usize {
-        const CANDIDATES: [fn(&Node) -> Twist; 4] = [
-            |node| node.start_from(node.target),
-            |node| node.start_from(node.before),
-            |node| node.start_from(Twist::REST),
-            Node::repeated,
-        ];
         let mut least = f64::NAN;
-        for (i, twist) in CANDIDATES.into_iter().enumerate() {
-            self.start.clear();
-            self.start.extend(problem.nodes.iter().map(|node| entry_of::<D>(twist(node))));
+        for guess in Guess::ALL {
+            problem.guess(guess, &mut self.start);
             problem.move_to(&self.start);
             let energy = problem.evaluate(&mut self.residual);
-            if i == 0 || energy < least {
+            if guess == Guess::ALL[0] || energy < least {
                 least = energy;
                 std::mem::swap(&mut self.u, &mut self.start);
             }
         }
         problem.move_to(&self.u);
-        CANDIDATES.len()
+        Guess::ALL.len()
     }
 
     /// Back to where the last step began: one body's overflow must not spread over its island.

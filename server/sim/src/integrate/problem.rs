@@ -1,134 +1,308 @@
-//! One island: its bodies, its potentials, and the residual that Newton makes zero.
+//! One island: its unknowns, its potentials, and the residual that a solver makes zero.
 
 use glam::DVec3;
 
 use super::block::Entry;
-use crate::dof::{Node, Twist};
+use super::figure::Figures;
+use crate::autodiff::Dual;
+use crate::dof::{BLOCK_RATES_MAX, Frame, Node, Twist};
 use crate::potential::axle::AxleTerm;
 use crate::potential::ball_joint::BallJointTerm;
 use crate::potential::contact::ContactTerm;
 use crate::potential::pd::PdTerm;
 use crate::potential::spring::SpringTerm;
-use crate::potential::{Candidate, FIXED, NodeIndex, Term, Trial, Wrench};
-
-/// The potentials of an island, by type.
-#[derive(Default)]
-pub(crate) struct Terms {
-    pub contacts: Vec<ContactTerm>,
-    pub springs: Vec<SpringTerm>,
-    pub ball_joints: Vec<BallJointTerm>,
-    pub axles: Vec<AxleTerm>,
-    pub pds: Vec<PdTerm>,
-}
+use crate::potential::{FIXED, FrameIndex, Term, Wrench};
 
 /// Something to be done with every potential, in a fixed order.
 pub(super) trait Visitor {
     fn visit<T: Term>(&mut self, terms: &mut [T]);
 }
 
-impl Terms {
-    pub(super) fn visit(&mut self, visitor: &mut impl Visitor) {
-        visitor.visit(&mut self.contacts);
-        visitor.visit(&mut self.springs);
-        visitor.visit(&mut self.ball_joints);
-        visitor.visit(&mut self.axles);
-        visitor.visit(&mut self.pds);
+macro_rules! terms {
+    ($($name:ident: $Term:ty,)*) => {
+        /// The potentials of an island, by type.
+        #[derive(Default)]
+        pub(crate) struct Terms {
+            $(pub $name: Vec<$Term>,)*
+        }
+
+        impl Terms {
+            pub(super) fn visit(&mut self, visitor: &mut impl Visitor) {
+                $(visitor.visit(&mut self.$name);)*
+            }
+
+            pub fn clear(&mut self) {
+                $(self.$name.clear();)*
+            }
+        }
+    };
+}
+
+terms! {
+    contacts: ContactTerm,
+    springs: SpringTerm,
+    ball_joints: BallJointTerm,
+    axles: AxleTerm,
+    pds: PdTerm,
+}
+
+/// A block of unknowns: rates at the end of the tick.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Unknown {
+    /// The twist of a particle or rigid body.
+    Body(Node),
+    /// Rates of a figure.
+    Rates(Rates),
+}
+
+/// A block of a figure's rates. Numbers beyond its size are zero.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rates {
+    pub size: u8,
+    /// At the start of the tick.
+    pub before: [f64; BLOCK_RATES_MAX],
+    /// At the end of it without potentials, as far as that is known.
+    pub target: [f64; BLOCK_RATES_MAX],
+    /// At the end of it if everything happens once more that happened in the last tick.
+    pub repeated: [f64; BLOCK_RATES_MAX],
+    /// What resists each rate, kg or kg m².
+    pub masses: [f64; BLOCK_RATES_MAX],
+    /// Of the whole body, kg.
+    pub body_mass: f64,
+}
+
+/// Where a solver may start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Guess {
+    /// The motion without potentials.
+    Target,
+    /// Last tick's motion.
+    Before,
+    /// No motion.
+    Rest,
+    /// Last tick's impulses once more.
+    Repeated,
+}
+
+impl Guess {
+    pub const ALL: [Self; 4] = [Self::Target, Self::Before, Self::Rest, Self::Repeated];
+}
+
+impl Unknown {
+    fn guess<const D: usize>(&self, guess: Guess) -> Entry<D> {
+        match (self, guess) {
+            (Self::Body(node), Guess::Target) => entry_of(node.start_from(node.target)),
+            (Self::Body(node), Guess::Before) => entry_of(node.start_from(node.before)),
+            (Self::Body(node), Guess::Rest) => entry_of(node.start_from(Twist::REST)),
+            (Self::Body(node), Guess::Repeated) => entry_of(node.repeated()),
+            (Self::Rates(rates), Guess::Target) => leading(&rates.target),
+            (Self::Rates(rates), Guess::Before) => leading(&rates.before),
+            (Self::Rates(_), Guess::Rest) => [0.0; D],
+            (Self::Rates(rates), Guess::Repeated) => leading(&rates.repeated),
+        }
     }
 
-    pub fn clear(&mut self) {
-        self.contacts.clear();
-        self.springs.clear();
-        self.ball_joints.clear();
-        self.axles.clear();
-        self.pds.clear();
+    /// Its own inertia times rates; a figure's is added elsewhere.
+    fn inertia_product<const D: usize>(&self, x: &Entry<D>) -> Entry<D> {
+        let Self::Body(node) = self else { return [0.0; D] };
+        let Twist { linear, angular } = twist_of(x);
+        entry_of(Twist { linear: node.mass * linear, angular: node.inertia * angular })
+    }
+
+    /// Whether three numbers do not say it all.
+    pub fn is_wide(&self) -> bool {
+        match self {
+            Self::Body(node) => node.rotates,
+            Self::Rates(rates) => rates.size > 3,
+        }
+    }
+
+    /// Squared residual in energy norm, over the mass: a squared speed, m²/s².
+    fn residual_speed_squared<const D: usize>(&self, entry: &Entry<D>) -> f64 {
+        match self {
+            Self::Body(node) => {
+                let Twist { linear, angular } = twist_of(entry);
+                let turning = if node.rotates { angular.dot(node.inverse_inertia * angular) } else { 0.0 };
+                (linear.length_squared() / node.mass + turning) / node.mass
+            }
+            Self::Rates(rates) => {
+                let of_rate = |(r, m): (&f64, &f64)| r * r / m;
+                let size = usize::from(rates.size);
+                entry.iter().zip(&rates.masses[..size]).map(of_rate).sum::<f64>() / rates.body_mass
+            }
+        }
     }
 }
 
-/// An island. Bodies are in elimination order.
+/// An island. Unknowns are in elimination order.
 #[derive(Default)]
 pub(crate) struct Problem {
     pub dt: f64,
-    pub nodes: Vec<Node>,
+    pub gravity: DVec3,
+    pub unknowns: Vec<Unknown>,
     pub terms: Terms,
-    /// The candidate state; after solving, the state at the end of the tick.
-    pub trial: Vec<Trial>,
+    pub figures: Figures,
+    /// At the candidate state: one for every unknown, then one for every attachment. After solving, at the end of the tick.
+    pub frames: Vec<Frame<f64>>,
 }
 
 impl Problem {
-    /// The candidate that the trial holds.
-    pub fn candidate(&self) -> Candidate<'_> {
-        Candidate { dt: self.dt, trial: &self.trial }
+    /// Starts an island of no bodies.
+    pub fn clear(&mut self, dt: f64, gravity: DVec3) {
+        (self.dt, self.gravity) = (dt, gravity);
+        self.unknowns.clear();
+        self.terms.clear();
+        self.figures.clear();
+        self.frames.clear();
     }
 
-    /// Moves the trial to the twists `u`.
+    /// Blocks of unknowns.
+    pub fn len(&self) -> usize {
+        self.unknowns.len()
+    }
+
+    /// Replaces `u` by a guess.
+    pub(super) fn guess<const D: usize>(&self, guess: Guess, u: &mut Vec<Entry<D>>) {
+        u.clear();
+        u.extend(self.unknowns.iter().map(|unknown| unknown.guess(guess)));
+    }
+
+    /// Moves the candidate to the rates `u`.
     pub(super) fn move_to<const D: usize>(&mut self, u: &[Entry<D>]) {
-        self.trial.clear();
-        self.trial.extend(self.nodes.iter().zip(u).map(|(node, u)| {
-            let twist = twist_of(u);
-            Trial { pose: node.pose(twist, self.dt), twist }
+        self.frames.clear();
+        self.frames.extend(self.unknowns.iter().zip(u).map(|(unknown, u)| match unknown {
+            Unknown::Body(node) => node.frame(twist_of(u), self.dt),
+            Unknown::Rates(_) => Frame::WORLD,
         }));
+        self.figures.move_to(u, self.dt, &mut self.frames);
     }
 
-    /// Incremental potential ½ |u − u*|²_M + Φ at the trial, J, and its gradient, the residual, in kg m/s and kg m²/s.
+    /// Incremental potential ½ |u − u*|²_M + Φ at the candidate, J, and its gradient, the residual, in kg m/s and
+    /// kg m²/s.
     pub(super) fn evaluate<const D: usize>(&mut self, residual: &mut Vec<Entry<D>>) -> f64 {
         residual.clear();
         let mut energy = 0.0;
-        for (node, trial) in self.nodes.iter().zip(&self.trial) {
-            let linear = trial.twist.linear - node.target.linear;
-            let angular = trial.twist.angular - node.target.angular;
-            let momentum = Wrench { force: node.mass * linear, torque: node.inertia * angular };
-            energy += 0.5 * (momentum.force.dot(linear) + momentum.torque.dot(angular));
+        for (unknown, frame) in self.unknowns.iter().zip(&self.frames) {
             let mut entry = [0.0; D];
-            add_wrench(&mut entry, momentum, 1.0);
+            if let Unknown::Body(node) = unknown {
+                let linear = DVec3::from(frame.linear) - node.target.linear;
+                let angular = DVec3::from(frame.angular) - node.target.angular;
+                let momentum = Wrench { force: (node.mass * linear).into(), torque: (node.inertia * angular).into() };
+                energy += 0.5 * (momentum.force.dot(linear.into()) + momentum.torque.dot(angular.into()));
+                add_wrench(&mut entry, momentum, 1.0);
+            }
             residual.push(entry);
         }
-        let candidate = Candidate { dt: self.dt, trial: &self.trial };
-        let mut visitor = Evaluate { candidate, residual, energy };
-        self.terms.visit(&mut visitor);
-        visitor.energy
+        let Self { dt, gravity, terms, figures, frames, .. } = self;
+        figures.begin_gradient();
+        let mut visitor = Evaluate { dt: *dt, frames, residual, figures, energy };
+        terms.visit(&mut visitor);
+        energy = visitor.energy;
+        energy + figures.evaluate(*dt, *gravity, frames, residual)
     }
 
-    /// Takes what is frozen during a Newton iteration from the trial.
+    /// y = H x, H the second derivative of the incremental potential at the candidate: exact for terms, by automatic
+    /// differentiation along x (talk, "The Cel Damage Solver": a procedural representation of the Hessian), and as
+    /// assembled for figures. Unlike the assembled matrix it can be indefinite.
+    pub(super) fn hessian_product<const D: usize>(&mut self, x: &[Entry<D>], y: &mut Vec<Entry<D>>) {
+        let Self { dt, unknowns, terms, figures, frames, .. } = self;
+        y.clear();
+        y.extend(unknowns.iter().zip(x).map(|(unknown, x)| unknown.inertia_product(x)));
+        figures.assemble(*dt, frames, &mut |row, column, block| {
+            let (row, column) = (row as usize, column as usize);
+            for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+                y[row][i] += block[i][j] * x[column][j];
+                if row != column {
+                    y[column][j] += block[i][j] * x[row][i];
+                }
+            }
+        });
+        let along = Propose { step: x, figures, dt: *dt };
+        let moving: Vec<_> =
+            (0..).zip(frames.iter()).map(|(i, frame)| frame.along([along.displacement(i)], *dt)).collect();
+        let mut tangents = vec![Wrench::ZERO; moving.len()];
+        terms.visit(&mut Product { dt: *dt, moving: &moving, tangents: &mut tangents });
+        for (entry, tangent) in y.iter_mut().zip(&tangents) {
+            add_wrench(entry, *tangent, *dt);
+        }
+        for (k, tangent) in tangents[x.len()..].iter().enumerate() {
+            let numbers = tangent.numbers();
+            for influence in figures.influences(k) {
+                for (entry, column) in y[influence.block as usize].iter_mut().zip(&influence.columns) {
+                    *entry += *dt * (0..6).map(|i| column[i] * numbers[i]).sum::<f64>();
+                }
+            }
+        }
+    }
+
+    /// Takes what is frozen during a Newton iteration from the candidate.
     pub(super) fn relinearise(&mut self) {
-        let candidate = Candidate { dt: self.dt, trial: &self.trial };
-        self.terms.visit(&mut Relinearise { candidate });
+        self.terms.visit(&mut Relinearise { dt: self.dt, frames: &self.frames });
     }
 
     /// Tells the potentials which step the linear model proposes.
     pub(super) fn propose<const D: usize>(&mut self, step: &[Entry<D>]) {
-        self.terms.visit(&mut Propose { step, dt: self.dt });
+        let Self { dt, terms, figures, .. } = self;
+        terms.visit(&mut Propose { step, figures, dt: *dt });
     }
 
-    /// Largest residual of any body in energy norm, as a speed of the body, m/s.
+    /// Largest residual of any block in energy norm, as a speed of its body, m/s.
     pub(super) fn residual_speed<const D: usize>(&self, residual: &[Entry<D>]) -> f64 {
-        let squared = |(node, entry): (&Node, &Entry<D>)| {
-            let Twist { linear, angular } = twist_of(entry);
-            let turning = if node.rotates { angular.dot(node.inverse_inertia * angular) } else { 0.0 };
-            (linear.length_squared() / node.mass + turning) / node.mass
-        };
-        self.nodes
-            .iter()
-            .zip(residual)
-            .map(squared)
-            .fold(0.0, |worst: f64, x| if x > worst || x.is_nan() { x } else { worst })
-            .sqrt()
+        let squared = self.unknowns.iter().zip(residual).map(|(unknown, r)| unknown.residual_speed_squared(r));
+        squared.fold(0.0, |worst: f64, x| if x > worst || x.is_nan() { x } else { worst }).sqrt()
+    }
+
+    /// Frames of a term at the candidate.
+    pub fn pair<T: Term>(&self, term: &T) -> [&Frame<f64>; 2] {
+        pair(&self.frames, term)
     }
 }
 
+/// Frames of a term.
+pub(super) fn pair<'a, T: Term>(frames: &'a [Frame<f64>], term: &T) -> [&'a Frame<f64>; 2] {
+    term.frames().map(|i| frames.get(i as usize).unwrap_or(&Frame::WORLD))
+}
+
 struct Evaluate<'a, const D: usize> {
-    candidate: Candidate<'a>,
-    residual: &'a mut Vec<Entry<D>>,
+    dt: f64,
+    frames: &'a [Frame<f64>],
+    residual: &'a mut [Entry<D>],
+    figures: &'a mut Figures,
     energy: f64,
 }
 
 impl<const D: usize> Visitor for Evaluate<'_, D> {
     fn visit<T: Term>(&mut self, terms: &mut [T]) {
         for term in terms {
-            let (energy, wrenches) = term.evaluate(&self.candidate);
+            let (energy, wrenches) = term.evaluate(self.dt, pair(self.frames, term));
             self.energy += energy;
-            for (node, wrench) in term.nodes().into_iter().zip(wrenches) {
-                if node != FIXED {
-                    add_wrench(&mut self.residual[node as usize], wrench, self.candidate.dt);
+            for (frame, wrench) in term.frames().into_iter().zip(wrenches) {
+                if let Some(entry) = self.residual.get_mut(frame as usize) {
+                    add_wrench(entry, wrench, self.dt);
+                } else if frame != FIXED {
+                    let scaled = Wrench { force: wrench.force * self.dt, torque: wrench.torque * self.dt };
+                    self.figures.push(frame as usize - self.residual.len(), scaled);
+                }
+            }
+        }
+    }
+}
+
+struct Product<'a> {
+    dt: f64,
+    moving: &'a [Frame<Dual<1>>],
+    tangents: &'a mut [Wrench],
+}
+
+impl Visitor for Product<'_> {
+    fn visit<T: Term>(&mut self, terms: &mut [T]) {
+        for term in terms {
+            let frames = term.frames();
+            let at = frames.map(|i| self.moving.get(i as usize).unwrap_or(&Frame::WORLD));
+            let (_, wrenches) = term.evaluate(self.dt, at);
+            for (frame, wrench) in frames.into_iter().zip(wrenches) {
+                if let Some(tangent) = self.tangents.get_mut(frame as usize) {
+                    *tangent += wrench.tangent();
                 }
             }
         }
@@ -136,33 +310,48 @@ impl<const D: usize> Visitor for Evaluate<'_, D> {
 }
 
 struct Relinearise<'a> {
-    candidate: Candidate<'a>,
+    dt: f64,
+    frames: &'a [Frame<f64>],
 }
 
 impl Visitor for Relinearise<'_> {
     fn visit<T: Term>(&mut self, terms: &mut [T]) {
         for term in terms {
-            term.relinearise(&self.candidate);
+            term.relinearise(self.dt, pair(self.frames, term));
         }
     }
 }
 
 struct Propose<'a, const D: usize> {
     step: &'a [Entry<D>],
+    figures: &'a Figures,
     dt: f64,
+}
+
+impl<const D: usize> Propose<'_, D> {
+    /// Displacement of a frame, m and rad.
+    fn displacement(&self, frame: FrameIndex) -> Twist {
+        let scaled = |t: Twist| Twist { linear: t.linear * self.dt, angular: t.angular * self.dt };
+        if let Some(entry) = self.step.get(frame as usize) {
+            return scaled(twist_of(entry));
+        }
+        let mut twist = Twist::REST;
+        if frame != FIXED {
+            for influence in self.figures.influences(frame as usize - self.step.len()) {
+                for (column, &rate) in influence.columns.iter().zip(&self.step[influence.block as usize]) {
+                    twist.linear += DVec3::from_slice(column) * rate;
+                    twist.angular += DVec3::from_slice(&column[3..]) * rate;
+                }
+            }
+        }
+        scaled(twist)
+    }
 }
 
 impl<const D: usize> Visitor for Propose<'_, D> {
     fn visit<T: Term>(&mut self, terms: &mut [T]) {
-        let displacement = |node: NodeIndex| {
-            if node == FIXED {
-                return Twist::default();
-            }
-            let Twist { linear, angular } = twist_of(&self.step[node as usize]);
-            Twist { linear: linear * self.dt, angular: angular * self.dt }
-        };
         for term in terms {
-            term.propose(term.nodes().map(displacement));
+            term.propose(term.frames().map(|frame| self.displacement(frame)));
         }
     }
 }
@@ -174,19 +363,18 @@ pub(super) fn twist_of<const D: usize>(entry: &Entry<D>) -> Twist {
 }
 
 /// A twist as a body's share of a vector.
-pub(super) fn entry_of<const D: usize>(twist: Twist) -> Entry<D> {
+fn entry_of<const D: usize>(twist: Twist) -> Entry<D> {
     let mut entry = [0.0; D];
-    add_wrench(&mut entry, Wrench { force: twist.linear, torque: twist.angular }, 1.0);
+    add_wrench(&mut entry, Wrench { force: twist.linear.into(), torque: twist.angular.into() }, 1.0);
     entry
 }
 
+fn leading<const D: usize>(numbers: &[f64; BLOCK_RATES_MAX]) -> Entry<D> {
+    std::array::from_fn(|i| numbers[i])
+}
+
 fn add_wrench<const D: usize>(entry: &mut Entry<D>, wrench: Wrench, factor: f64) {
-    for (i, x) in wrench.force.to_array().into_iter().enumerate() {
-        entry[i] += factor * x;
-    }
-    if D == 6 {
-        for (i, x) in wrench.torque.to_array().into_iter().enumerate() {
-            entry[3 + i] += factor * x;
-        }
+    for (entry, x) in entry.iter_mut().zip(wrench.numbers()) {
+        *entry += factor * x;
     }
 }

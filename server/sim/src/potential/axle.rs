@@ -6,8 +6,9 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::{Candidate, NodeIndex, PairBlocks, Term, Wrench, outer};
-use crate::dof::{BodyId, Node};
+use super::{FrameIndex, PairBlocks, Term, Wrench, outer};
+use crate::autodiff::{Scalar, Vec3};
+use crate::dof::{BodyId, Frame, Node};
 use crate::error::{SimError, require, require_vector};
 
 slotmap::new_key_type! {
@@ -90,7 +91,7 @@ impl AxleDesc {
 #[derive(Clone, Debug)]
 pub(crate) struct AxleTerm {
     /// Chassis, wheel.
-    pub nodes: [NodeIndex; 2],
+    frames: [FrameIndex; 2],
     desc: AxleDesc,
     /// Of the two directions in which the hub may not move, N/m.
     hub_stiffness: f64,
@@ -107,19 +108,19 @@ pub(crate) struct AxleTerm {
 
 impl AxleTerm {
     /// `joint_stiffness` in reduced masses per dt².
-    pub fn new(nodes: [NodeIndex; 2], desc: &AxleDesc, all: &[Node], joint_stiffness: f64, dt: f64) -> Self {
-        let [chassis, wheel] = nodes.map(|i| &all[i as usize]);
+    pub fn new(frames: [FrameIndex; 2], desc: &AxleDesc, nodes: [&Node; 2], joint_stiffness: f64, dt: f64) -> Self {
+        let [chassis, wheel] = nodes;
         let axis = DQuat::from_rotation_y(desc.control.steer) * DVec3::Z;
         let spin_axis = wheel.free_rotation * DVec3::Z;
         let across = spin_axis.any_orthonormal_vector();
         let inertia = |node: &Node| across.dot(node.inertia * across);
-        let reduced_inertia = (inertia(chassis).recip() + inertia(wheel).recip()).recip();
+        let reduced = |a: f64, b: f64| (a.recip() + b.recip()).recip();
         let start = chassis.start.rotation.inverse() * (wheel.start.position - chassis.start.position);
         Self {
-            nodes,
+            frames,
             desc: *desc,
-            hub_stiffness: joint_stiffness * super::reduced_mass(all, nodes) / (dt * dt),
-            plane_stiffness: joint_stiffness * reduced_inertia / (dt * dt),
+            hub_stiffness: joint_stiffness * reduced(chassis.mass, wheel.mass) / (dt * dt),
+            plane_stiffness: joint_stiffness * reduced(inertia(chassis), inertia(wheel)) / (dt * dt),
             axis,
             spin_axis,
             start_travel: start.y,
@@ -129,8 +130,7 @@ impl AxleTerm {
 
     /// The wheel's angular velocity if the chassis turns on as it did and the wheel's plane follows it and the steering,
     /// rad/s. The wheel's own momentum says something else: it resists any turn of the plane.
-    pub fn guess_spin(&self, all: &[Node], dt: f64) -> DVec3 {
-        let [chassis, wheel] = self.nodes.map(|i| &all[i as usize]);
+    pub fn guess_spin(&self, [chassis, wheel]: [&Node; 2], dt: f64) -> DVec3 {
         let turn = chassis.before.angular;
         let wanted = DQuat::from_scaled_axis(dt * turn) * chassis.start.rotation * self.axis;
         let spin = self.spin_axis * self.spin_axis.dot(wheel.before.angular);
@@ -138,76 +138,78 @@ impl AxleTerm {
     }
 
     /// Hub in the chassis' frame, from where it would be without load, m.
-    fn travel(&self, at: &Candidate) -> DVec3 {
-        let (chassis, wheel) = (at.pose(self.nodes[0]), at.pose(self.nodes[1]));
-        chassis.rotation.inverse() * (wheel.position - chassis.position) - self.desc.hub
+    fn travel<S: Scalar>(&self, [chassis, wheel]: [&Frame<S>; 2]) -> Vec3<S> {
+        chassis.rotation.transposed_multiply(wheel.position - chassis.position) - Vec3::constant(self.desc.hub)
     }
 
     /// Distance of the hub from its line, m.
-    pub fn gap(&self, at: &Candidate) -> f64 {
+    pub fn gap(&self, at: [&Frame<f64>; 2]) -> f64 {
         let travel = self.travel(at);
         travel.x.hypot(travel.z)
     }
 
-    fn spin(&self, at: &Candidate) -> f64 {
-        self.spin_axis.dot(at.twist(self.nodes[1]).angular - at.twist(self.nodes[0]).angular)
+    fn spin<S: Scalar>(&self, [chassis, wheel]: [&Frame<S>; 2]) -> S {
+        (wheel.angular - chassis.angular).along(self.spin_axis)
     }
 
-    /// The two clamped torques on a wheel at `spin`: (gain, spin error, limit).
-    fn motors(&self, spin: f64) -> [(f64, f64, f64); 2] {
+    /// The two clamped torques on a wheel: (gain, target spin, limit).
+    fn motors(&self) -> [(f64, f64, f64); 2] {
         let AxleControl { drive, brake, .. } = self.desc.control;
-        [(drive.gain, spin - drive.target_speed, drive.max_torque), (self.brake_gain, spin, brake)]
+        [(drive.gain, drive.target_speed, drive.max_torque), (self.brake_gain, 0.0, brake)]
     }
 }
 
 impl Term for AxleTerm {
-    fn nodes(&self) -> [NodeIndex; 2] {
-        self.nodes
+    fn frames(&self) -> [FrameIndex; 2] {
+        self.frames
     }
 
-    fn evaluate(&self, at: &Candidate) -> (f64, [Wrench; 2]) {
-        let (chassis, wheel) = (at.pose(self.nodes[0]), at.pose(self.nodes[1]));
+    fn evaluate<S: Scalar>(&self, dt: f64, at: [&Frame<S>; 2]) -> (S, [Wrench<S>; 2]) {
+        let [chassis, wheel] = at;
         let travel = self.travel(at);
-        let motion = travel.y + self.desc.hub.y - self.start_travel;
-        let (spring, damper) = (self.desc.stiffness, self.desc.damping / at.dt);
-        let local = DVec3::new(
-            self.hub_stiffness * travel.x,
-            spring * travel.y + damper * motion,
-            self.hub_stiffness * travel.z,
-        );
-        let mut energy = 0.5 * self.hub_stiffness * (travel.x * travel.x + travel.z * travel.z)
-            + 0.5 * spring * travel.y * travel.y
-            + 0.5 * damper * motion * motion;
-        let force = chassis.rotation * local;
+        let motion = travel.y + (self.desc.hub.y - self.start_travel);
+        let (spring, damper) = (self.desc.stiffness, self.desc.damping / dt);
+        let local = Vec3 {
+            x: travel.x * self.hub_stiffness,
+            y: travel.y * spring + motion * damper,
+            z: travel.z * self.hub_stiffness,
+        };
+        let off = travel.x * travel.x + travel.z * travel.z;
+        let mut energy =
+            off * (0.5 * self.hub_stiffness) + travel.y * travel.y * (0.5 * spring) + motion * motion * (0.5 * damper);
+        let force = chassis.rotation.multiply(local);
         let arm = wheel.position - chassis.position;
-        let (wanted, actual) = (chassis.rotation * self.axis, wheel.rotation * DVec3::Z);
-        energy += 0.5 * self.plane_stiffness * (wanted - actual).length_squared();
+        let (wanted, actual) = (chassis.arm(self.axis), wheel.arm(DVec3::Z));
+        let tilt = wanted - actual;
+        energy += tilt.dot(tilt) * (0.5 * self.plane_stiffness);
         // Derivative of ½|z − z'|² with respect to a turn of the wheel, whose z is the second.
         // The axis is a function of the turn across the spin axis alone (see `Node`), so there is no torque about that:
         // the part about it that an unconverged plane's would have makes wheels spin away.
-        let mut torque = wanted.cross(actual).reject_from_normalized(self.spin_axis) * self.plane_stiffness;
-        for (gain, error, limit) in self.motors(self.spin(at)) {
-            let (value, slope) = clamped(gain, error, limit);
-            energy += at.dt * value;
-            torque += self.spin_axis * slope;
+        let plane = wanted.cross(actual);
+        let about = Vec3::constant(self.spin_axis);
+        let mut torque = (plane - about.scale(plane.along(self.spin_axis))) * self.plane_stiffness;
+        for (gain, target, limit) in self.motors() {
+            let (value, slope) = clamped(gain, self.spin(at) - target, limit);
+            energy += value * dt;
+            torque += about.scale(slope);
         }
         let on_chassis = Wrench { force: -force, torque: -arm.cross(force) - torque };
         (energy, [on_chassis, Wrench { force, torque }])
     }
 
-    fn hessian(&self, at: &Candidate) -> PairBlocks {
-        let (chassis, wheel) = (at.pose(self.nodes[0]), at.pose(self.nodes[1]));
-        let r = DMat3::from_quat(chassis.rotation);
-        let along = self.desc.stiffness + self.desc.damping / at.dt;
+    fn hessian(&self, dt: f64, at: [&Frame<f64>; 2]) -> PairBlocks {
+        let [chassis, wheel] = at;
+        let r = chassis.rotation.value();
+        let along = self.desc.stiffness + self.desc.damping / dt;
         let local = DMat3::from_diagonal(DVec3::new(self.hub_stiffness, along, self.hub_stiffness));
-        let arm = wheel.position - chassis.position;
+        let arm = DVec3::from(wheel.position - chassis.position);
         let mut blocks = PairBlocks::of_points(r * local * r.transpose(), arm, DVec3::ZERO);
         let spin = self.spin(at);
         let motors: f64 = self
-            .motors(spin)
+            .motors()
             .into_iter()
-            .filter(|&(gain, error, limit)| gain * error.abs() < limit)
-            .map(|(gain, ..)| gain / at.dt)
+            .filter(|&(gain, target, limit)| gain * (spin - target).abs() < limit)
+            .map(|(gain, ..)| gain / dt)
             .sum();
         // About the axis at the start of the tick: that is what a wheel spins about without leaving its plane.
         let about = outer(self.spin_axis, self.spin_axis);
@@ -218,12 +220,12 @@ impl Term for AxleTerm {
 }
 
 /// Huber's function of `error`: its value and its derivative clamp(gain error, ±limit).
-fn clamped(gain: f64, error: f64, limit: f64) -> (f64, f64) {
-    let slope = gain * error;
-    if slope.abs() <= limit {
-        (0.5 * slope * error, slope)
+pub(super) fn clamped<S: Scalar>(gain: f64, error: S, limit: f64) -> (S, S) {
+    let slope = error * gain;
+    if slope.value().abs() <= limit {
+        (slope * error * 0.5, slope)
     } else {
-        (limit * (error.abs() - 0.5 * limit / gain), limit * error.signum())
+        ((error.abs() - 0.5 * limit / gain) * limit, S::from(limit * error.value().signum()))
     }
 }
 

@@ -2,8 +2,10 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{Anchor, Candidate, NodeIndex, PairBlocks, Term, Wrench, geometric_stiffness};
-use crate::dof::Twist;
+use super::spring::Line;
+use super::{Anchor, End, FrameIndex, PairBlocks, Term, Wrench, geometric_stiffness};
+use crate::autodiff::Scalar;
+use crate::dof::{Frame, Twist};
 use crate::error::{SimError, require_vector};
 
 slotmap::new_key_type! {
@@ -30,65 +32,54 @@ impl BallJointDesc {
 /// A ball joint in an island: energy ½ k |gap|².
 #[derive(Clone, Debug)]
 pub(crate) struct BallJointTerm {
-    pub nodes: [NodeIndex; 2],
-    pub points: [DVec3; 2],
+    ends: [End; 2],
     /// N/m.
-    pub stiffness: f64,
+    stiffness: f64,
     /// Gradient on b that the geometric stiffness is made of: what the linear model predicts, last tick's at first, N.
     /// The force at the candidate itself is stiffness × an unconverged gap, wrong by orders of magnitude.
     pub force: DVec3,
-    linearisation: Linearisation,
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct Linearisation {
     arms: [DVec3; 2],
+    /// At the last linearisation, m.
     gap: DVec3,
 }
 
 impl BallJointTerm {
-    pub fn new(nodes: [NodeIndex; 2], points: [DVec3; 2], stiffness: f64, force: DVec3) -> Self {
-        Self { nodes, points, stiffness, force, linearisation: Linearisation::default() }
-    }
-
-    fn linearise(&self, at: &Candidate) -> Linearisation {
-        let (a, b) = (at.pose(self.nodes[0]), at.pose(self.nodes[1]));
-        let arms = [a.rotation * self.points[0], b.rotation * self.points[1]];
-        Linearisation { arms, gap: b.position + arms[1] - a.position - arms[0] }
+    pub fn new(ends: [End; 2], stiffness: f64, force: DVec3) -> Self {
+        Self { ends, stiffness, force, arms: [DVec3::ZERO; 2], gap: DVec3::ZERO }
     }
 
     /// Distance of the two points, m.
-    pub fn gap(&self, at: &Candidate) -> f64 {
-        self.linearise(at).gap.length()
+    pub fn gap(&self, at: [&Frame<f64>; 2]) -> f64 {
+        Line::new(&self.ends, at).vector.length()
     }
 }
 
 impl Term for BallJointTerm {
-    fn nodes(&self) -> [NodeIndex; 2] {
-        self.nodes
+    fn frames(&self) -> [FrameIndex; 2] {
+        self.ends.map(|end| end.frame)
     }
 
-    fn evaluate(&self, at: &Candidate) -> (f64, [Wrench; 2]) {
-        let Linearisation { arms, gap } = self.linearise(at);
+    fn evaluate<S: Scalar>(&self, _dt: f64, at: [&Frame<S>; 2]) -> (S, [Wrench<S>; 2]) {
+        let Line { arms, vector: gap } = Line::new(&self.ends, at);
         let force = gap * self.stiffness;
-        (0.5 * force.dot(gap), [Wrench::at(-force, arms[0]), Wrench::at(force, arms[1])])
+        (force.dot(gap) * 0.5, [Wrench::at(-force, arms[0]), Wrench::at(force, arms[1])])
     }
 
-    fn hessian(&self, _at: &Candidate) -> PairBlocks {
-        let arms = self.linearisation.arms;
+    fn hessian(&self, _dt: f64, _at: [&Frame<f64>; 2]) -> PairBlocks {
+        let arms = self.arms;
         let mut blocks = PairBlocks::of_points(DMat3::from_diagonal(DVec3::splat(self.stiffness)), arms[0], arms[1]);
         blocks.add_rotation_a(geometric_stiffness(-self.force, arms[0]));
         blocks.add_rotation_b(geometric_stiffness(self.force, arms[1]));
         blocks
     }
 
-    fn relinearise(&mut self, at: &Candidate) {
-        self.linearisation = self.linearise(at);
+    fn relinearise(&mut self, _dt: f64, at: [&Frame<f64>; 2]) {
+        let line = Line::new(&self.ends, at);
+        (self.arms, self.gap) = (line.arms.map(DVec3::from), line.vector.into());
     }
 
     fn propose(&mut self, [a, b]: [Twist; 2]) {
-        let Linearisation { arms, gap } = self.linearisation;
-        let moved = b.at(arms[1]) - a.at(arms[0]);
-        self.force = (gap + moved) * self.stiffness;
+        let moved = b.at(self.arms[1]) - a.at(self.arms[0]);
+        self.force = (self.gap + moved) * self.stiffness;
     }
 }

@@ -7,7 +7,9 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{Candidate, NodeIndex, PairBlocks, Term, Wrench, outer};
+use super::{FrameIndex, PairBlocks, Term, Wrench, outer};
+use crate::autodiff::{Scalar, Vec3};
+use crate::dof::Frame;
 use crate::settings::ContactSettings;
 
 /// Slip at which friction is saturated, in units of limit / stiffness: where x − 4/27 x³ peaks.
@@ -23,8 +25,8 @@ const TANGENT_SHARE: f64 = 0.8;
 /// A contact point in an island.
 #[derive(Clone, Debug)]
 pub(crate) struct ContactTerm {
-    pub nodes: [NodeIndex; 2],
-    /// From the centres of mass to the point, m.
+    frames: [FrameIndex; 2],
+    /// From the frames' origins to the point, m.
     arms: [DVec3; 2],
     /// From the first body to the second.
     normal: DVec3,
@@ -45,33 +47,44 @@ pub(crate) struct ContactTerm {
     limit: f64,
 }
 
-/// Normal force over stiffness, its integral and its derivative, at depth s: k (s²/w − s³/3w²) up to w, then a line.
-fn normal_spline(s: f64, w: f64) -> (f64, f64, f64) {
-    if s <= 0.0 {
-        (0.0, 0.0, 0.0)
-    } else if s < w {
+/// Normal force over stiffness and its integral at depth s: k (s²/w − s³/3w²) up to w, then a line.
+fn normal_spline<S: Scalar>(s: S, w: f64) -> (S, S) {
+    if s.below(f64::MIN_POSITIVE) {
+        (S::ZERO, S::ZERO)
+    } else if s.below(w) {
         let x = s / w;
-        (w * w * x * x * x * (1.0 / 3.0 - x / 12.0), w * x * x * (1.0 - x / 3.0), x * (2.0 - x))
+        (x * x * x * (-x / 12.0 + 1.0 / 3.0) * (w * w), x * x * (-x / 3.0 + 1.0) * w)
     } else {
         let d = s - w;
-        (w * w / 4.0 + 2.0 / 3.0 * w * d + 0.5 * d * d, 2.0 / 3.0 * w + d, 1.0)
+        (d * d * 0.5 + d * (2.0 / 3.0 * w) + w * w / 4.0, d + 2.0 / 3.0 * w)
     }
 }
 
-/// Friction over its limit, its integral and its derivative, at slip x: x − 4/27 x³ up to 1.5, then 1.
-fn friction_patch(x: f64) -> (f64, f64, f64) {
-    if x < SATURATION {
+/// Derivative of the spline's force.
+fn normal_slope(s: f64, w: f64) -> f64 {
+    let x = (s / w).clamp(0.0, 1.0);
+    x * (2.0 - x)
+}
+
+/// Friction over its limit and its integral at slip x: x − 4/27 x³ up to 1.5, then 1.
+fn friction_patch<S: Scalar>(x: S) -> (S, S) {
+    if x.below(SATURATION) {
         let x2 = x * x;
-        (x2 * (0.5 - x2 / 27.0), x * (1.0 - 4.0 / 27.0 * x2), 1.0 - 4.0 / 9.0 * x2)
+        (x2 * (-x2 / 27.0 + 0.5), x * (-x2 * (4.0 / 27.0) + 1.0))
     } else {
-        (x - 0.5625, 1.0, 0.0)
+        (x - 0.5625, S::ONE)
     }
+}
+
+/// Derivative of the patch's force.
+fn friction_slope(x: f64) -> f64 {
+    if x < SATURATION { 1.0 - 4.0 / 9.0 * x * x } else { 0.0 }
 }
 
 impl ContactTerm {
     /// `mass` is the reduced mass of the pair, kg; `closing_speed` how fast the point closes at the start, m/s.
     pub fn new(
-        nodes: [NodeIndex; 2],
+        frames: [FrameIndex; 2],
         point: &crate::collide::ContactPoint,
         arms: [DVec3; 2],
         mass: f64,
@@ -85,7 +98,7 @@ impl ContactTerm {
         let stiffness = settings.normal_stiffness.max((overlap / settings.transition).min(STIFFEST));
         let start_gap = point.gap.max(-settings.recovery_speed * dt);
         Self {
-            nodes,
+            frames,
             arms,
             normal: point.normal,
             start_gap,
@@ -100,79 +113,82 @@ impl ContactTerm {
     }
 
     /// Displacement of b against a over the tick, m.
-    fn displacement(&self, at: &Candidate) -> DVec3 {
-        (at.twist(self.nodes[1]).at(self.arms[1]) - at.twist(self.nodes[0]).at(self.arms[0])) * at.dt
+    fn displacement<S: Scalar>(&self, dt: f64, [a, b]: [&Frame<S>; 2]) -> Vec3<S> {
+        (b.velocity_at(self.arms[1]) - a.velocity_at(self.arms[0])) * dt
     }
 
-    fn depth(&self, displacement: DVec3) -> f64 {
-        -(self.start_gap + self.normal.dot(displacement))
+    fn depth<S: Scalar>(&self, displacement: Vec3<S>) -> S {
+        -displacement.along(self.normal) - self.start_gap
     }
 
     /// Slip of the anchor, its length, and that length in units of limit / stiffness.
-    fn slip(&self, displacement: DVec3) -> (DVec3, f64, f64) {
-        let slip = self.anchor + displacement - self.normal * self.normal.dot(displacement);
+    fn slip<S: Scalar>(&self, displacement: Vec3<S>) -> (Vec3<S>, S, S) {
+        let along = Vec3::constant(self.normal).scale(displacement.along(self.normal));
+        let slip = Vec3::constant(self.anchor) + displacement - along;
         let length = slip.length();
-        (slip, length, self.tangent_stiffness * length / self.limit.max(1e-300))
+        (slip, length, length * (self.tangent_stiffness / self.limit.max(1e-300)))
     }
 
     /// Normal force, N.
-    pub fn normal_force(&self, at: &Candidate) -> f64 {
-        self.normal_stiffness * normal_spline(self.depth(self.displacement(at)), self.transition).1
+    pub fn normal_force(&self, dt: f64, at: [&Frame<f64>; 2]) -> f64 {
+        self.normal_stiffness * normal_spline(self.depth(self.displacement(dt, at)), self.transition).1
     }
 
     /// Depth at the candidate state, m; negative where it is open.
-    pub fn final_depth(&self, at: &Candidate) -> f64 {
-        self.depth(self.displacement(at)) + self.excess_depth
+    pub fn final_depth(&self, dt: f64, at: [&Frame<f64>; 2]) -> f64 {
+        self.depth(self.displacement(dt, at)) + self.excess_depth
     }
 
     /// The anchor for the next tick: the slip, pulled along at the cone.
-    pub fn final_anchor(&self, at: &Candidate) -> DVec3 {
-        let (slip, length, _) = self.slip(self.displacement(at));
-        let reach = SATURATION * self.friction * self.normal_force(at) / self.tangent_stiffness;
-        if length > reach { slip * (reach / length) } else { slip }
+    pub fn final_anchor(&self, dt: f64, at: [&Frame<f64>; 2]) -> DVec3 {
+        let (slip, length, _) = self.slip(self.displacement(dt, at));
+        let reach = SATURATION * self.friction * self.normal_force(dt, at) / self.tangent_stiffness;
+        DVec3::from(slip) * if length > reach { reach / length } else { 1.0 }
     }
 }
 
 impl Term for ContactTerm {
-    fn nodes(&self) -> [NodeIndex; 2] {
-        self.nodes
+    fn frames(&self) -> [FrameIndex; 2] {
+        self.frames
     }
 
-    fn evaluate(&self, at: &Candidate) -> (f64, [Wrench; 2]) {
-        let displacement = self.displacement(at);
-        let (integral, value, _) = normal_spline(self.depth(displacement), self.transition);
-        let mut energy = self.normal_stiffness * integral;
-        let mut force = self.normal * (-self.normal_stiffness * value);
+    fn evaluate<S: Scalar>(&self, dt: f64, at: [&Frame<S>; 2]) -> (S, [Wrench<S>; 2]) {
+        let displacement = self.displacement(dt, at);
+        let (integral, value) = normal_spline(self.depth(displacement), self.transition);
+        let mut energy = integral * self.normal_stiffness;
+        let mut force = Vec3::constant(self.normal).scale(-value * self.normal_stiffness);
         if self.limit > 0.0 {
             let (slip, length, x) = self.slip(displacement);
-            let (integral, value, _) = friction_patch(x);
-            energy += self.limit * self.limit / self.tangent_stiffness * integral;
-            force += slip * (self.limit * value / length.max(1e-300));
+            let (integral, value) = friction_patch(x);
+            energy += integral * (self.limit * self.limit / self.tangent_stiffness);
+            if length.value() > 0.0 {
+                force += slip.scale(value * self.limit / length);
+            }
         }
-        (energy, [Wrench::at(-force, self.arms[0]), Wrench::at(force, self.arms[1])])
+        (energy, [Wrench::at_fixed(-force, self.arms[0]), Wrench::at_fixed(force, self.arms[1])])
     }
 
-    fn hessian(&self, at: &Candidate) -> PairBlocks {
-        let displacement = self.displacement(at);
+    fn hessian(&self, dt: f64, at: [&Frame<f64>; 2]) -> PairBlocks {
+        let displacement = self.displacement(dt, at);
         let nn = outer(self.normal, self.normal);
-        let mut k = nn * (self.normal_stiffness * normal_spline(self.depth(displacement), self.transition).2);
+        let mut k = nn * (self.normal_stiffness * normal_slope(self.depth(displacement), self.transition));
         if self.limit > 0.0 {
             let (slip, length, x) = self.slip(displacement);
-            let (_, value, slope) = friction_patch(x);
-            let secant = if x > 0.0 { value / x } else { 1.0 };
+            let secant = if x > 0.0 { friction_patch(x).1 / x } else { 1.0 };
             let tangent = DMat3::IDENTITY - nn;
             k += tangent * (self.tangent_stiffness * secant);
             if length > 0.0 {
                 // The tangent alone vanishes where it slides, and Newton then jumps to and fro across the anchor.
-                let direction = slip / length;
-                k += outer(direction, direction) * (self.tangent_stiffness * (slope - secant) * TANGENT_SHARE);
+                let direction = DVec3::from(slip) / length;
+                let slope = (friction_slope(x) - secant) * TANGENT_SHARE;
+                k += outer(direction, direction) * (self.tangent_stiffness * slope);
             }
         }
         PairBlocks::of_points(k, self.arms[0], self.arms[1])
     }
 
-    fn relinearise(&mut self, at: &Candidate) {
-        self.limit = self.friction * self.normal_force(at);
+    fn relinearise(&mut self, dt: f64, at: [&Frame<f64>; 2]) {
+        self.limit = self.friction * self.normal_force(dt, at);
     }
 }
 
@@ -183,13 +199,15 @@ mod tests {
     /// Value and derivative are continuous and are the derivatives of one another.
     #[test]
     fn splines_are_smooth() {
+        type Spline = (fn(f64) -> (f64, f64), fn(f64) -> f64);
+        let splines: [Spline; 2] =
+            [(|s| normal_spline(s, 1.0), |s| normal_slope(s, 1.0)), (friction_patch, friction_slope)];
         let h = 1e-6;
-        for i in 1..400 {
-            let x = f64::from(i) * 0.01;
-            for spline in [|x| normal_spline(x, 1.0), friction_patch as fn(f64) -> _] {
+        for x in (1..400).map(|i| f64::from(i) * 0.01) {
+            for (spline, slope) in splines {
                 let (below, here, above) = (spline(x - h), spline(x), spline(x + h));
                 assert!(((above.0 - below.0) / (2.0 * h) - here.1).abs() < 1e-5, "value at {x}");
-                assert!(((above.1 - below.1) / (2.0 * h) - here.2).abs() < 1e-5, "slope at {x}");
+                assert!(((above.1 - below.1) / (2.0 * h) - slope(x)).abs() < 1e-5, "slope at {x}");
             }
         }
     }

@@ -3,8 +3,9 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{Candidate, FIXED, NodeIndex, PairBlocks, Term, Wrench};
-use crate::dof::BodyId;
+use super::{FIXED, FrameIndex, PairBlocks, Term, Wrench};
+use crate::autodiff::{Scalar, Vec3};
+use crate::dof::{BodyId, Frame};
 use crate::error::{SimError, require, require_vector};
 
 slotmap::new_key_type! {
@@ -83,7 +84,7 @@ impl PdGains {
 /// velocity that would be right, with a constant slope where the force is at its limit.
 #[derive(Clone, Debug)]
 pub(crate) struct PdTerm {
-    pub node: NodeIndex,
+    frame: FrameIndex,
     /// Ks dt + Kd, N s/m.
     slope: f64,
     goal: DVec3,
@@ -91,35 +92,36 @@ pub(crate) struct PdTerm {
 }
 
 impl PdTerm {
-    pub fn new(node: NodeIndex, desc: &PdDesc, gains: PdGains, mass: f64, position: DVec3, dt: f64) -> Self {
+    pub fn new(frame: FrameIndex, desc: &PdDesc, gains: PdGains, mass: f64, position: DVec3, dt: f64) -> Self {
         let slope = gains.stiffness * dt + gains.damping;
         let PdControl { target, target_velocity } = desc.control;
         let goal = ((target - position) * gains.stiffness + target_velocity * gains.damping) / slope.max(1e-300);
-        Self { node, slope: slope * mass, goal, max_force: desc.max_force }
+        Self { frame, slope: slope * mass, goal, max_force: desc.max_force }
     }
 
     /// Force without the limit, and the factor that the limit leaves of it.
-    fn force(&self, at: &Candidate) -> (DVec3, f64) {
-        let force = (self.goal - at.twist(self.node).linear) * self.slope;
-        (force, (self.max_force / force.length().max(1e-300)).min(1.0))
+    fn force<S: Scalar>(&self, body: &Frame<S>) -> (Vec3<S>, S) {
+        let force = (Vec3::constant(self.goal) - body.linear) * self.slope;
+        let size = force.length();
+        (force, if size.below(self.max_force) { S::ONE } else { S::from(self.max_force) / size })
     }
 }
 
 impl Term for PdTerm {
-    fn nodes(&self) -> [NodeIndex; 2] {
-        [self.node, FIXED]
+    fn frames(&self) -> [FrameIndex; 2] {
+        [self.frame, FIXED]
     }
 
-    fn evaluate(&self, at: &Candidate) -> (f64, [Wrench; 2]) {
-        let (force, left) = self.force(at);
+    fn evaluate<S: Scalar>(&self, dt: f64, [body, _]: [&Frame<S>; 2]) -> (S, [Wrench<S>; 2]) {
+        let (force, left) = self.force(body);
         // Huber's function of the velocity error, over one tick.
-        let energy = at.dt * left * (1.0 - left / 2.0) * force.length_squared() / self.slope.max(1e-300);
-        (energy, [Wrench::at(-force * left, DVec3::ZERO), Wrench::default()])
+        let energy = left * (-left / 2.0 + 1.0) * force.dot(force) * (dt / self.slope.max(1e-300));
+        (energy, [Wrench::at_fixed(-force.scale(left), DVec3::ZERO), Wrench::ZERO])
     }
 
-    fn hessian(&self, at: &Candidate) -> PairBlocks {
-        let (_, left) = self.force(at);
-        PairBlocks::of_points(DMat3::from_diagonal(DVec3::splat(self.slope * left / at.dt)), DVec3::ZERO, DVec3::ZERO)
+    fn hessian(&self, dt: f64, [body, _]: [&Frame<f64>; 2]) -> PairBlocks {
+        let (_, left) = self.force(body);
+        PairBlocks::of_points(DMat3::from_diagonal(DVec3::splat(self.slope * left / dt)), DVec3::ZERO, DVec3::ZERO)
     }
 }
 

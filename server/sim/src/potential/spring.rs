@@ -1,9 +1,10 @@
 //! Spring and damper between two points: the author's stiffness, integrated implicitly.
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 
-use super::{Anchor, Candidate, NodeIndex, PairBlocks, Term, Wrench, geometric_stiffness, outer};
-use crate::dof::Pose;
+use super::{Anchor, End, FrameIndex, PairBlocks, Term, Wrench, geometric_stiffness, outer};
+use crate::autodiff::{Scalar, Vec3};
+use crate::dof::Frame;
 use crate::error::{SimError, require, require_vector};
 
 slotmap::new_key_type! {
@@ -42,57 +43,76 @@ impl SpringDesc {
 /// rate over the tick. Both depend on the length alone, so the force is central and angular momentum is kept.
 #[derive(Clone, Debug)]
 pub(crate) struct SpringTerm {
-    pub nodes: [NodeIndex; 2],
-    pub desc: SpringDesc,
+    ends: [End; 2],
+    rest_length: f64,
+    stiffness: f64,
+    damping: f64,
     /// Length at the start of the tick, m.
-    pub start_length: f64,
+    start_length: f64,
 }
 
-impl SpringTerm {
-    pub fn new(nodes: [NodeIndex; 2], desc: SpringDesc, start: [Pose; 2]) -> Self {
-        let start_length = (start[1].point(desc.b.point) - start[0].point(desc.a.point)).length();
-        Self { nodes, desc, start_length }
+/// A line between two points of frames.
+pub(super) struct Line<S> {
+    /// From the frames' origins to the points, m.
+    pub arms: [Vec3<S>; 2],
+    /// From the first point to the second.
+    pub vector: Vec3<S>,
+}
+
+impl<S: Scalar> Line<S> {
+    pub fn new(ends: &[End; 2], [a, b]: [&Frame<S>; 2]) -> Self {
+        let arms = [a.arm(ends[0].point), b.arm(ends[1].point)];
+        Self { arms, vector: b.position + arms[1] - a.position - arms[0] }
     }
 
-    /// Arms of both ends, vector from a to b, and its length.
-    fn ends(&self, at: &Candidate) -> ([glam::DVec3; 2], glam::DVec3, f64) {
-        let (a, b) = (at.pose(self.nodes[0]), at.pose(self.nodes[1]));
-        let arms = [a.rotation * self.desc.a.point, b.rotation * self.desc.b.point];
-        let line = b.position + arms[1] - a.position - arms[0];
-        (arms, line, line.length())
-    }
-
-    /// Derivative of the energy with respect to the length, N.
-    fn tension(&self, length: f64, dt: f64) -> f64 {
-        let SpringDesc { rest_length, stiffness, damping, .. } = self.desc;
-        stiffness * (length - rest_length) + damping / dt * (length - self.start_length)
+    /// Wrenches of a pull by `tension` (S per m of length) along the line.
+    pub fn pull(&self, direction: Vec3<S>, tension: S) -> [Wrench<S>; 2] {
+        let force = direction.scale(tension);
+        [Wrench::at(-force, self.arms[0]), Wrench::at(force, self.arms[1])]
     }
 }
 
-impl Term for SpringTerm {
-    fn nodes(&self) -> [NodeIndex; 2] {
-        self.nodes
-    }
-
-    fn evaluate(&self, at: &Candidate) -> (f64, [Wrench; 2]) {
-        let (arms, line, length) = self.ends(at);
-        let SpringDesc { rest_length, stiffness, damping, .. } = self.desc;
-        let (stretch, motion) = (length - rest_length, length - self.start_length);
-        let energy = 0.5 * stiffness * stretch * stretch + 0.5 * damping / at.dt * motion * motion;
-        let force = line.normalize_or_zero() * self.tension(length, at.dt);
-        (energy, [Wrench::at(-force, arms[0]), Wrench::at(force, arms[1])])
-    }
-
-    fn hessian(&self, at: &Candidate) -> PairBlocks {
-        let (arms, line, length) = self.ends(at);
-        let direction = line.normalize_or_zero();
-        let tension = self.tension(length, at.dt);
+impl Line<f64> {
+    /// Hessian of an energy of the length with first derivative `tension` and second derivative `along`.
+    pub fn hessian(&self, tension: f64, along: f64) -> PairBlocks {
+        let (arms, line) = (self.arms.map(DVec3::from), DVec3::from(self.vector));
+        let (length, direction) = (line.length(), line.normalize_or_zero());
         let across = if length > 0.0 { (tension / length).max(0.0) } else { 0.0 };
-        let along = self.desc.stiffness + self.desc.damping / at.dt;
         let nn = outer(direction, direction);
         let mut blocks = PairBlocks::of_points(nn * along + (DMat3::IDENTITY - nn) * across, arms[0], arms[1]);
         blocks.add_rotation_a(geometric_stiffness(direction * -tension, arms[0]));
         blocks.add_rotation_b(geometric_stiffness(direction * tension, arms[1]));
         blocks
+    }
+}
+
+impl SpringTerm {
+    pub fn new(ends: [End; 2], desc: &SpringDesc, start_length: f64) -> Self {
+        let SpringDesc { rest_length, stiffness, damping, .. } = *desc;
+        Self { ends, rest_length, stiffness, damping, start_length }
+    }
+
+    /// Derivative of the energy with respect to the length, N.
+    fn tension<S: Scalar>(&self, length: S, dt: f64) -> S {
+        (length - self.rest_length) * self.stiffness + (length - self.start_length) * (self.damping / dt)
+    }
+}
+
+impl Term for SpringTerm {
+    fn frames(&self) -> [FrameIndex; 2] {
+        self.ends.map(|end| end.frame)
+    }
+
+    fn evaluate<S: Scalar>(&self, dt: f64, at: [&Frame<S>; 2]) -> (S, [Wrench<S>; 2]) {
+        let line = Line::new(&self.ends, at);
+        let length = line.vector.length();
+        let (stretch, motion) = (length - self.rest_length, length - self.start_length);
+        let energy = stretch * stretch * (0.5 * self.stiffness) + motion * motion * (0.5 * self.damping / dt);
+        (energy, line.pull(line.vector.normalize_or_zero(), self.tension(length, dt)))
+    }
+
+    fn hessian(&self, dt: f64, at: [&Frame<f64>; 2]) -> PairBlocks {
+        let line = Line::new(&self.ends, at);
+        line.hessian(self.tension(line.vector.length(), dt), self.stiffness + self.damping / dt)
     }
 }

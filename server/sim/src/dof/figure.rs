@@ -1,0 +1,164 @@
+//! A body of a general kind in the world: its [`Dof`], what it collides with, and what it remembers.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DQuat, DVec3};
+
+use super::interface::{BLOCK_RATES_MAX, Dof, Inertia, PartPoint};
+use super::{Motion, Pose};
+use crate::collide::Collider;
+use crate::error::{LARGEST, SimError, require};
+use crate::integrate::figure::part_momentum;
+
+/// A body of a general kind to be added.
+pub struct FigureDesc {
+    /// What it is.
+    pub dof: Arc<dyn Dof>,
+    /// Positions, block by block.
+    pub q: Vec<f64>,
+    /// Rates, block by block.
+    pub v: Vec<f64>,
+    /// What it collides with.
+    pub colliders: Vec<PartCollider>,
+}
+
+/// A collider on a part of a body. Colliders of one body do not collide with each other.
+#[derive(Clone, Debug)]
+pub struct PartCollider {
+    /// Where the shape's origin is; its axes are the part's.
+    pub at: PartPoint,
+    /// Shape and material.
+    pub collider: Collider,
+}
+
+/// A figure in the world.
+#[derive(Clone)]
+pub(crate) struct FigureBody {
+    pub dof: Arc<dyn Dof>,
+    pub colliders: Vec<PartCollider>,
+    /// Change of the rates in the last tick.
+    pub change: Vec<f64>,
+    /// What resists each rate at the start, kg or kg m².
+    pub masses: Vec<f64>,
+    /// kg.
+    pub mass: f64,
+}
+
+impl std::fmt::Debug for FigureBody {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:?}", self.dof.kind())
+    }
+}
+
+impl FigureDesc {
+    /// # Errors
+    /// [`SimError`] naming what is wrong.
+    pub(crate) fn validate(&self) -> Result<(), SimError> {
+        let blocks = self.dof.blocks();
+        let fits = blocks.iter().all(|b| (1..=BLOCK_RATES_MAX).contains(&usize::from(b.rates)));
+        if blocks.is_empty() || !fits {
+            return Err(SimError::Unusable { what: "a figure needs blocks of 1 to 6 rates" });
+        }
+        let positions: usize = blocks.iter().map(|b| usize::from(b.positions)).sum();
+        let rates: usize = blocks.iter().map(|b| usize::from(b.rates)).sum();
+        require(self.q.len() == positions, "length of q", self.q.len() as f64, "the sum of the blocks' positions")?;
+        require(self.v.len() == rates, "length of v", self.v.len() as f64, "the sum of the blocks' rates")?;
+        for (numbers, what) in [(&self.q, "q"), (&self.v, "v")] {
+            numbers.iter().try_for_each(|&x| require(x.abs() < LARGEST, what, x, "finite and below 1e9"))?;
+        }
+        if let Inertia::Points(masses) = self.dof.inertia() {
+            let points =
+                blocks.iter().all(|b| (b.positions, b.rates) == (3, 3)) && masses.diagonal.len() == blocks.len();
+            if !points {
+                return Err(SimError::Unusable { what: "point masses need blocks of three coordinates, one a mass" });
+            }
+        }
+        for &m in &masses(&*self.dof, &self.q) {
+            require(m > 0.0 && m < LARGEST, "mass of a coordinate", m, "above 0, below 1e9 kg or kg m²")?;
+        }
+        for part in &self.colliders {
+            require(part.at.part < self.dof.parts(), "part of a collider", f64::from(part.at.part), "a part's index")?;
+            part.collider.validate_moving()?;
+        }
+        Ok(())
+    }
+}
+
+impl FigureBody {
+    pub fn new(desc: FigureDesc) -> Self {
+        let mass = match desc.dof.inertia() {
+            Inertia::Parts(parts) => parts.iter().map(|part| part.mass).sum(),
+            Inertia::Points(masses) => masses.total(),
+        };
+        let masses = masses(&*desc.dof, &desc.q);
+        Self { change: vec![0.0; desc.v.len()], masses, mass, dof: desc.dof, colliders: desc.colliders }
+    }
+
+    /// Pose of the frame at a material point.
+    pub fn pose(&self, at: PartPoint, q: &[f64], v: &[f64]) -> Pose {
+        let frame = self.dof.frame(at, q, v);
+        Pose { position: frame.position.into(), rotation: DQuat::from_mat3(&frame.rotation.value()).normalize() }
+    }
+
+    pub fn motion(&self, q: &[f64], v: &[f64]) -> Motion {
+        match self.dof.inertia() {
+            Inertia::Parts(parts) => {
+                let mut sum = Motion::default();
+                for (part, inertia) in (0..).zip(parts) {
+                    let frame = self.dof.frame(PartPoint { part, point: inertia.centre }, q, v);
+                    let momentum = part_momentum(&frame, inertia.mass, inertia.inertia);
+                    let (position, twist) = (DVec3::from(frame.position), frame.twist());
+                    let (linear, angular) = (DVec3::from(momentum.force), DVec3::from(momentum.torque));
+                    sum.momentum += linear;
+                    sum.angular_momentum += position.cross(linear) + angular;
+                    sum.energy += 0.5 * (linear.dot(twist.linear) + angular.dot(twist.angular));
+                    sum.moment += inertia.mass * position;
+                }
+                sum
+            }
+            Inertia::Points(masses) => {
+                let point = |numbers: &[f64], i: usize| DVec3::from_slice(&numbers[3 * i..]);
+                let mut momenta: Vec<_> = masses.diagonal.iter().enumerate().map(|(i, &m)| m * point(v, i)).collect();
+                let mut moments: Vec<_> = masses.diagonal.iter().enumerate().map(|(i, &m)| m * point(q, i)).collect();
+                for &(i, j, m) in &masses.off_diagonal {
+                    let (i, j) = (i as usize, j as usize);
+                    momenta[i] += m * point(v, j);
+                    momenta[j] += m * point(v, i);
+                    moments[i] += m * point(q, j);
+                    moments[j] += m * point(q, i);
+                }
+                Motion {
+                    momentum: momenta.iter().sum(),
+                    angular_momentum: momenta.iter().enumerate().map(|(i, &p)| point(q, i).cross(p)).sum(),
+                    energy: 0.5 * momenta.iter().enumerate().map(|(i, &p)| point(v, i).dot(p)).sum::<f64>(),
+                    moment: moments.iter().sum(),
+                }
+            }
+        }
+    }
+}
+
+/// The diagonal of the mass matrix at `q`.
+fn masses(dof: &dyn Dof, q: &[f64]) -> Vec<f64> {
+    match dof.inertia() {
+        Inertia::Points(masses) => masses.diagonal.iter().flat_map(|&m| [m; 3]).collect(),
+        Inertia::Parts(parts) => {
+            let sizes: Vec<_> = dof.blocks().iter().map(|b| usize::from(b.rates)).collect();
+            let starts: Vec<usize> = sizes.iter().scan(0, |sum, n| Some(std::mem::replace(sum, *sum + n))).collect();
+            let mut diagonal = vec![0.0; sizes.iter().sum()];
+            let rest = vec![0.0; diagonal.len()];
+            for (part, inertia) in (0..).zip(parts) {
+                let at = PartPoint { part, point: inertia.centre };
+                let tensor: DMat3 = crate::integrate::figure::world_inertia(&dof.frame(at, q, &rest), inertia.inertia);
+                dof.jacobian(at, q, &mut |block, columns| {
+                    for (k, column) in columns.iter().enumerate().take(sizes[block]) {
+                        let (linear, angular) = (DVec3::from_slice(column), DVec3::from_slice(&column[3..]));
+                        let m = inertia.mass * linear.length_squared() + angular.dot(tensor * angular);
+                        diagonal[starts[block] + k] += m;
+                    }
+                });
+            }
+            diagonal
+        }
+    }
+}

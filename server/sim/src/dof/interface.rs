@@ -1,0 +1,179 @@
+//! The DOF interface (talk, "The DOF Interface"): Kinematics, Inertia and Potentials are all the code that a kind needs.
+//!
+//! Particles and rigid bodies are built into the integrator, which predicts their free flight. Every other kind, one of a
+//! game's own included, is a [`Dof`]: `examples/own_kind.rs` makes one.
+//!
+//! Rates come in blocks of at most [`BLOCK_RATES_MAX`], the blocks of the sparse system.
+
+use glam::{DMat3, DVec3};
+
+use super::Frame;
+
+/// Most rates of a block.
+pub const BLOCK_RATES_MAX: usize = 6;
+
+/// Derivative of a frame's twist (velocity, angular velocity) with respect to each rate of a block.
+pub type Columns = [[f64; 6]; BLOCK_RATES_MAX];
+
+/// A matrix between the rates of two blocks; rows and columns beyond their sizes are zero.
+pub type RateBlock = [[f64; BLOCK_RATES_MAX]; BLOCK_RATES_MAX];
+
+/// Sizes of a block of coordinates: a unit quaternion has four positions and three rates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BlockSize {
+    /// Numbers in Q.
+    pub positions: u8,
+    /// Numbers in Q', 1 to [`BLOCK_RATES_MAX`].
+    pub rates: u8,
+}
+
+/// A material point of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PartPoint {
+    /// Which of the body's parts.
+    pub part: u32,
+    /// In the part's frame, m.
+    pub point: DVec3,
+}
+
+/// Inertia of a kind: the relation between forces and accelerations.
+#[derive(Clone, Copy, Debug)]
+pub enum Inertia<'a> {
+    /// Rigid parts, one for every part: their momentum is differenced in world space and projected on the rates.
+    Parts(&'a [PartInertia]),
+    /// Every block is a point of the world (its three rates are the point's velocity) and the mass matrix is constant.
+    Points(&'a PointMasses),
+}
+
+/// Inertia of one rigid part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PartInertia {
+    /// kg.
+    pub mass: f64,
+    /// Centre of mass in the part's frame, m.
+    pub centre: DVec3,
+    /// About the centre of mass, in the part's frame, kg m².
+    pub inertia: DMat3,
+}
+
+/// A constant mass matrix over points: one number for each pair, times the 3×3 identity.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PointMasses {
+    /// m_ii, kg.
+    pub diagonal: Vec<f64>,
+    /// (i, j, m_ij) with i > j, kg.
+    pub off_diagonal: Vec<(u32, u32, f64)>,
+}
+
+/// A distance between two points of a body that is to be held (talk, "Constraints").
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointRod {
+    /// Blocks of the two points.
+    pub points: [u32; 2],
+    /// m.
+    pub length: f64,
+    /// How far it may be off at the end of a tick, m.
+    pub tolerance: f64,
+}
+
+/// A body's state within a tick: positions and rates at its start, and at a candidate for its end.
+#[derive(Clone, Copy, Debug)]
+pub struct LocalState<'a> {
+    /// Length of the tick, s.
+    pub dt: f64,
+    /// Positions at the start.
+    pub q0: &'a [f64],
+    /// Rates at the start.
+    pub v0: &'a [f64],
+    /// Positions at the candidate.
+    pub q1: &'a [f64],
+    /// Rates at the candidate.
+    pub v1: &'a [f64],
+}
+
+/// A kind of DOF with everything about one body of that kind that does not change.
+pub trait Dof: Send + Sync {
+    /// What people call the kind.
+    fn kind(&self) -> super::DofKind;
+
+    // --- Kinematics
+
+    /// Its blocks of coordinates. Q and Q' hold them one after the other.
+    fn blocks(&self) -> &[BlockSize];
+
+    /// Q1 = Q0 ⊕ dt Q1': the talk's second axiom. What is no vector space, a rotation, steps by its exponential map.
+    fn step(&self, q0: &[f64], v1: &[f64], dt: f64, q1: &mut [f64]) {
+        for ((q1, q0), v1) in q1.iter_mut().zip(q0).zip(v1) {
+            *q1 = q0 + dt * v1;
+        }
+    }
+
+    /// Number of parts.
+    fn parts(&self) -> u32;
+
+    /// The frame at a material point, with the rotation of the part there.
+    fn frame(&self, at: PartPoint, q: &[f64], v: &[f64]) -> Frame<f64>;
+
+    /// Hands `visit` every block that moves the frame at a material point, with the frame's derivatives.
+    fn jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns));
+
+    // --- Inertia
+
+    /// Its inertia.
+    fn inertia(&self) -> Inertia<'_>;
+
+    // --- Potentials
+
+    /// Rods between its points; for [`Inertia::Points`] alone.
+    fn rods(&self) -> &[PointRod] {
+        &[]
+    }
+
+    /// Energy of its own potentials at the candidate, J. Adds the derivative with respect to each rate's displacement
+    /// (rate × dt) to `gradient`.
+    fn energy(&self, _at: &LocalState, _gradient: &mut [f64]) -> f64 {
+        0.0
+    }
+
+    /// Hands `add` the positive semidefinite second derivative of that energy: (row block, column block, entries) for
+    /// the diagonal and the pairs with row > column.
+    fn stiffness(&self, _at: &LocalState, _add: &mut dyn FnMut(usize, usize, &RateBlock)) {}
+
+    /// Hands `couple` every pair of different blocks that [`Dof::stiffness`] may answer.
+    fn couplings(&self, _couple: &mut dyn FnMut(usize, usize)) {}
+}
+
+impl PointMasses {
+    /// Mass matrix of `points` points without mass.
+    pub fn new(points: usize) -> Self {
+        Self { diagonal: vec![0.0; points], off_diagonal: Vec::new() }
+    }
+
+    /// Adds the mass matrix `m` over `points`, kg.
+    pub fn add<const N: usize>(&mut self, points: [u32; N], m: &[[f64; N]; N]) {
+        for (i, &p) in points.iter().enumerate() {
+            self.diagonal[p as usize] += m[i][i];
+            for (j, &q) in points.iter().enumerate().filter(|&(_, &q)| q < p) {
+                match self.off_diagonal.binary_search_by_key(&(p, q), |&(p, q, _)| (p, q)) {
+                    Ok(place) => self.off_diagonal[place].2 += m[i][j],
+                    Err(place) => self.off_diagonal.insert(place, (p, q, m[i][j])),
+                }
+            }
+        }
+    }
+
+    /// Mass that a uniform acceleration of every point feels at each: the row sums, kg.
+    pub fn lumped(&self) -> Vec<f64> {
+        let mut lumped = self.diagonal.clone();
+        for &(i, j, m) in &self.off_diagonal {
+            lumped[i as usize] += m;
+            lumped[j as usize] += m;
+        }
+        lumped
+    }
+
+    /// Of all points, kg.
+    pub fn total(&self) -> f64 {
+        self.diagonal.iter().sum::<f64>() + 2.0 * self.off_diagonal.iter().map(|&(.., m)| m).sum::<f64>()
+    }
+}

@@ -1,0 +1,429 @@
+//! Bodies of general kinds within an island: their blocks of unknowns, the material points at which something acts on
+//! them, and their own residual.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+
+use super::block::{Block, Entry};
+use crate::dof::{Columns, Dof, Frame, Inertia, LocalState, PartPoint, Twist};
+use crate::potential::Wrench;
+
+/// A body of a general kind in an island.
+pub(crate) struct Figure {
+    pub dof: Arc<dyn Dof>,
+    /// Index in the island of each of its blocks.
+    pub blocks: Vec<u32>,
+    /// Where each block's rates start among the body's.
+    pub offsets: Vec<u32>,
+    pub q0: Vec<f64>,
+    pub v0: Vec<f64>,
+    pub q1: Vec<f64>,
+    pub v1: Vec<f64>,
+    gradient: Vec<f64>,
+    /// The parts' centres of mass among the attachments; empty where points carry the mass.
+    parts: Range<u32>,
+    /// Momentum that each part would have at the end of the tick without potentials.
+    free_momenta: Vec<Wrench>,
+}
+
+/// A material point of a figure at which something acts: one more frame of the island.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Attachment {
+    figure: u32,
+    at: PartPoint,
+    /// Its derivatives stay what they were at the start of the tick.
+    frozen: bool,
+    influences: (u32, u32),
+    pub start: Frame<f64>,
+    /// What resists a force here, kg.
+    pub mass: f64,
+}
+
+/// How a block moves an attachment's frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Influence {
+    /// Index in the island.
+    pub block: u32,
+    /// Block's index in its figure.
+    own_block: u32,
+    pub columns: Columns,
+}
+
+/// All figures of an island and their attachments.
+#[derive(Default)]
+pub(crate) struct Figures {
+    list: Vec<Figure>,
+    /// Figures of this tick; those after them keep their memory for later.
+    used: usize,
+    pub attachments: Vec<Attachment>,
+    influences: Vec<Influence>,
+    /// Gradient on each attachment.
+    wrenches: Vec<Wrench>,
+}
+
+impl Figures {
+    pub fn clear(&mut self) {
+        self.used = 0;
+        self.attachments.clear();
+        self.influences.clear();
+    }
+
+    pub fn list(&self) -> &[Figure] {
+        &self.list[..self.used]
+    }
+
+    /// Adds a figure with blocks at `blocks`. Answers its index.
+    pub fn add(&mut self, dof: &Arc<dyn Dof>, blocks: impl Iterator<Item = u32>, q: &[f64], v: &[f64]) -> u32 {
+        if self.used == self.list.len() {
+            self.list.push(Figure::new(dof));
+        }
+        let figure = &mut self.list[self.used];
+        figure.dof = Arc::clone(dof);
+        figure.start(blocks, q, v);
+        self.used += 1;
+        self.used as u32 - 1
+    }
+
+    /// Attaches the parts' centres of mass, where parts carry the mass.
+    pub fn attach_parts(&mut self, index: u32, dt: f64, gravity: DVec3) {
+        let dof = Arc::clone(&self.list[index as usize].dof);
+        let start = self.attachments.len() as u32;
+        self.list[index as usize].free_momenta.clear();
+        if let Inertia::Parts(parts) = dof.inertia() {
+            for (part, inertia) in (0..).zip(parts) {
+                let k = self.attach(index, PartPoint { part, point: inertia.centre }, false);
+                let momentum = part_momentum(&self.attachments[k as usize].start, inertia.mass, inertia.inertia);
+                let fall = Wrench { force: (gravity * (inertia.mass * dt)).into(), torque: Wrench::ZERO.torque };
+                let mut free = momentum;
+                free += fall;
+                self.list[index as usize].free_momenta.push(free);
+            }
+        }
+        self.list[index as usize].parts = start..self.attachments.len() as u32;
+    }
+
+    /// Makes a frame of a material point. Answers its index among the attachments.
+    pub fn attach(&mut self, figure: u32, at: PartPoint, frozen: bool) -> u32 {
+        let Self { list, influences, .. } = self;
+        let owner = &list[figure as usize];
+        let first = influences.len() as u32;
+        owner.dof.jacobian(at, &owner.q0, &mut |own_block, columns| {
+            let block = owner.blocks[own_block];
+            influences.push(Influence { block, own_block: own_block as u32, columns: *columns });
+        });
+        let range = (first, influences.len() as u32);
+        let start = owner.dof.frame(at, &owner.q0, &owner.v0);
+        let mass = owner.mass_at(at, &influences[first as usize..]);
+        self.attachments.push(Attachment { figure, at, frozen, influences: range, start, mass });
+        self.attachments.len() as u32 - 1
+    }
+
+    /// How blocks move attachment `k`.
+    pub fn influences(&self, k: usize) -> &[Influence] {
+        let (start, end) = self.attachments[k].influences;
+        &self.influences[start as usize..end as usize]
+    }
+
+    /// Moves everything to the rates `u`. `frames` are the island's: one for each of the `u`, then the attachments'.
+    pub fn move_to<const D: usize>(&mut self, u: &[Entry<D>], dt: f64, frames: &mut Vec<Frame<f64>>) {
+        for figure in &mut self.list[..self.used] {
+            figure.move_to(u, dt, frames);
+        }
+        for attachment in &self.attachments {
+            let figure = &self.list[attachment.figure as usize];
+            let (start, end) = attachment.influences;
+            let influences = &mut self.influences[start as usize..end as usize];
+            frames.push(attachment.frame(figure, influences));
+        }
+    }
+
+    /// Forgets the gradient on attachments.
+    pub fn begin_gradient(&mut self) {
+        self.wrenches.clear();
+        self.wrenches.resize(self.attachments.len(), Wrench::ZERO);
+    }
+
+    /// Adds to the gradient on attachment `k`.
+    pub fn push(&mut self, k: usize, wrench: Wrench) {
+        self.wrenches[k] += wrench;
+    }
+
+    /// Adds the figures' own residuals and everything that acts on attachments. Answers the energy.
+    pub fn evaluate<const D: usize>(
+        &mut self,
+        dt: f64,
+        gravity: DVec3,
+        frames: &[Frame<f64>],
+        residual: &mut [Entry<D>],
+    ) -> f64 {
+        let attached = &frames[residual.len()..];
+        let mut energy = 0.0;
+        for figure in &mut self.list[..self.used] {
+            energy += figure.evaluate(dt, gravity, attached, &mut self.wrenches, residual);
+        }
+        for k in 0..self.attachments.len() {
+            let wrench = self.wrenches[k].numbers();
+            for influence in self.influences(k) {
+                let entry = &mut residual[influence.block as usize];
+                for (entry, column) in entry.iter_mut().zip(&influence.columns) {
+                    *entry += (0..6).map(|i| column[i] * wrench[i]).sum::<f64>();
+                }
+            }
+        }
+        energy
+    }
+
+    /// Hands `add` the blocks of the figures' inertia and of their own potentials: (row, column, entries), rows not
+    /// above columns.
+    pub fn assemble(&self, dt: f64, frames: &[Frame<f64>], add: &mut impl FnMut(u32, u32, &Block<6>)) {
+        for figure in self.list() {
+            match figure.dof.inertia() {
+                Inertia::Points(masses) => figure.assemble_points(masses, add),
+                Inertia::Parts(parts) => {
+                    for (k, part) in (figure.parts.start as usize..).zip(parts) {
+                        let frame = &frames[frames.len() - self.attachments.len() + k];
+                        let inertia = world_inertia(frame, part.inertia);
+                        self.assemble_part(k, part.mass, inertia, add);
+                    }
+                }
+            }
+            figure.assemble_stiffness(dt, add);
+        }
+    }
+
+    fn assemble_part(&self, k: usize, mass: f64, inertia: DMat3, add: &mut impl FnMut(u32, u32, &Block<6>)) {
+        let mut tensor = [[0.0; 6]; 6];
+        for i in 0..3 {
+            tensor[i][i] = mass;
+            tensor[3 + i][3..].copy_from_slice(&inertia.col(i).to_array());
+        }
+        let influences = self.influences(k);
+        for a in influences {
+            for b in influences.iter().filter(|b| b.block <= a.block) {
+                add(a.block, b.block, &pulled_back(&a.columns, &tensor, &b.columns));
+            }
+        }
+    }
+
+    /// Hands `pair` every pair of different blocks that [`Figures::assemble`] touches.
+    pub fn couplings(&self, pair: &mut impl FnMut(u32, u32)) {
+        for figure in self.list() {
+            let blocks = &figure.blocks;
+            figure.dof.couplings(&mut |a, b| pair(blocks[a], blocks[b]));
+            if let Inertia::Points(masses) = figure.dof.inertia() {
+                masses.off_diagonal.iter().for_each(|&(a, b, _)| pair(blocks[a as usize], blocks[b as usize]));
+            }
+            for k in figure.parts.clone() {
+                let influences = self.influences(k as usize);
+                for (i, a) in influences.iter().enumerate() {
+                    influences[..i].iter().for_each(|b| pair(a.block, b.block));
+                }
+            }
+        }
+    }
+}
+
+impl Figure {
+    fn new(dof: &Arc<dyn Dof>) -> Self {
+        Self {
+            dof: Arc::clone(dof),
+            blocks: Vec::new(),
+            offsets: Vec::new(),
+            q0: Vec::new(),
+            v0: Vec::new(),
+            q1: Vec::new(),
+            v1: Vec::new(),
+            gradient: Vec::new(),
+            parts: 0..0,
+            free_momenta: Vec::new(),
+        }
+    }
+
+    fn start(&mut self, blocks: impl Iterator<Item = u32>, q: &[f64], v: &[f64]) {
+        self.blocks.clear();
+        self.blocks.extend(blocks);
+        self.offsets.clear();
+        let mut offset = 0;
+        for size in self.dof.blocks() {
+            self.offsets.push(offset);
+            offset += u32::from(size.rates);
+        }
+        for (mine, theirs) in [(&mut self.q0, q), (&mut self.q1, q), (&mut self.v0, v), (&mut self.v1, v)] {
+            mine.clear();
+            mine.extend_from_slice(theirs);
+        }
+    }
+
+    /// Island index and own rates of each block.
+    fn shares(&self) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
+        let ranges = self.offsets.iter().zip(self.dof.blocks());
+        let ranges = ranges.map(|(&start, size)| start as usize..start as usize + usize::from(size.rates));
+        self.blocks.iter().map(|&block| block as usize).zip(ranges)
+    }
+
+    /// What resists a force at a material point, kg.
+    fn mass_at(&self, at: PartPoint, influences: &[Influence]) -> f64 {
+        match self.dof.inertia() {
+            Inertia::Parts(parts) => parts[at.part as usize].mass,
+            Inertia::Points(masses) => {
+                let inverse = |i: &Influence| i.columns[0][0].powi(2) / masses.diagonal[i.own_block as usize];
+                influences.iter().map(inverse).sum::<f64>().recip()
+            }
+        }
+    }
+
+    fn local_state(&self, dt: f64) -> LocalState<'_> {
+        LocalState { dt, q0: &self.q0, v0: &self.v0, q1: &self.q1, v1: &self.v1 }
+    }
+
+    fn move_to<const D: usize>(&mut self, u: &[Entry<D>], dt: f64, frames: &mut [Frame<f64>]) {
+        let mut v1 = std::mem::take(&mut self.v1);
+        for (block, rates) in self.shares() {
+            let size = rates.len();
+            v1[rates].copy_from_slice(&u[block][..size]);
+        }
+        self.v1 = v1;
+        self.dof.step(&self.q0, &self.v1, dt, &mut self.q1);
+        if let Inertia::Points(_) = self.dof.inertia() {
+            for (i, &block) in self.blocks.iter().enumerate() {
+                let (position, velocity) = (DVec3::from_slice(&self.q1[3 * i..]), DVec3::from_slice(&self.v1[3 * i..]));
+                frames[block as usize] = Frame::point(position, velocity);
+            }
+        }
+    }
+
+    fn evaluate<const D: usize>(
+        &mut self,
+        dt: f64,
+        gravity: DVec3,
+        attached: &[Frame<f64>],
+        wrenches: &mut [Wrench],
+        residual: &mut [Entry<D>],
+    ) -> f64 {
+        let mut gradient = std::mem::take(&mut self.gradient);
+        gradient.clear();
+        gradient.resize(self.v1.len(), 0.0);
+        let mut energy = self.dof.energy(&self.local_state(dt), &mut gradient);
+        for (block, rates) in self.shares() {
+            for (entry, g) in residual[block].iter_mut().zip(&gradient[rates]) {
+                *entry += dt * g;
+            }
+        }
+        self.gradient = gradient;
+        let dof = Arc::clone(&self.dof);
+        energy += match dof.inertia() {
+            Inertia::Points(masses) => self.evaluate_points(masses, dt * gravity, residual),
+            Inertia::Parts(parts) => {
+                let all = (self.parts.start as usize..).zip(parts).zip(&self.free_momenta);
+                all.map(|((k, part), &free)| {
+                    let mut change = part_momentum(&attached[k], part.mass, part.inertia);
+                    change += Wrench { force: -free.force, torque: -free.torque };
+                    wrenches[k] += change;
+                    let turn = world_inertia(&attached[k], part.inertia).inverse() * DVec3::from(change.torque);
+                    0.5 * (change.force.dot(change.force) / part.mass + turn.dot(change.torque.into()))
+                })
+                .sum()
+            }
+        };
+        energy
+    }
+
+    /// M (v1 − v0 − g dt), and half its product with that difference.
+    fn evaluate_points<const D: usize>(
+        &self,
+        masses: &crate::dof::PointMasses,
+        fall: DVec3,
+        residual: &mut [Entry<D>],
+    ) -> f64 {
+        let change = |i: usize| DVec3::from_slice(&self.v1[3 * i..]) - DVec3::from_slice(&self.v0[3 * i..]) - fall;
+        let mut energy = 0.0;
+        let mut add = |i: usize, momentum: DVec3| {
+            let entry = &mut residual[self.blocks[i] as usize];
+            (0..3).for_each(|k| entry[k] += momentum[k]);
+        };
+        for (i, &m) in masses.diagonal.iter().enumerate() {
+            let change = change(i);
+            add(i, m * change);
+            energy += 0.5 * m * change.length_squared();
+        }
+        for &(i, j, m) in &masses.off_diagonal {
+            let (i, j) = (i as usize, j as usize);
+            let (a, b) = (change(i), change(j));
+            add(i, m * b);
+            add(j, m * a);
+            energy += m * a.dot(b);
+        }
+        energy
+    }
+
+    fn assemble_points(&self, masses: &crate::dof::PointMasses, add: &mut impl FnMut(u32, u32, &Block<6>)) {
+        let mut block = [[0.0; 6]; 6];
+        let mut scaled = |m: f64| {
+            (0..3).for_each(|k| block[k][k] = m);
+            block
+        };
+        for (i, &m) in masses.diagonal.iter().enumerate() {
+            add(self.blocks[i], self.blocks[i], &scaled(m));
+        }
+        for &(i, j, m) in &masses.off_diagonal {
+            add(self.blocks[i as usize], self.blocks[j as usize], &scaled(m));
+        }
+    }
+
+    fn assemble_stiffness(&self, dt: f64, add: &mut impl FnMut(u32, u32, &Block<6>)) {
+        self.dof.stiffness(&self.local_state(dt), &mut |row, column, block| {
+            let scaled = block.map(|r| r.map(|x| x * dt * dt));
+            add(self.blocks[row], self.blocks[column], &scaled);
+        });
+    }
+}
+
+impl Attachment {
+    /// The frame at the figure's candidate state; refreshes the derivatives, unless they are frozen.
+    fn frame(&self, figure: &Figure, influences: &mut [Influence]) -> Frame<f64> {
+        if !self.frozen {
+            let mut next = influences.iter_mut();
+            figure.dof.jacobian(self.at, &figure.q1, &mut |_, columns| {
+                if let Some(influence) = next.next() {
+                    influence.columns = *columns;
+                }
+            });
+            return figure.dof.frame(self.at, &figure.q1, &figure.v1);
+        }
+        let mut twist = Twist::REST;
+        for influence in influences {
+            let rates = &figure.v1[figure.offsets[influence.own_block as usize] as usize..];
+            let size = usize::from(figure.dof.blocks()[influence.own_block as usize].rates);
+            for (column, &rate) in influence.columns.iter().zip(&rates[..size]) {
+                twist.linear += DVec3::from_slice(column) * rate;
+                twist.angular += DVec3::from_slice(&column[3..]) * rate;
+            }
+        }
+        Frame { linear: twist.linear.into(), angular: twist.angular.into(), ..self.start }
+    }
+}
+
+/// Aᵀ H B, A and B derivatives of frames.
+pub(super) fn pulled_back(a: &Columns, h: &Block<6>, b: &Columns) -> Block<6> {
+    let mut half = [[0.0; 6]; 6];
+    for (half, column) in half.iter_mut().zip(b) {
+        for (x, row) in half.iter_mut().zip(h) {
+            *x = row.iter().zip(column).map(|(h, c)| h * c).sum();
+        }
+    }
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..6).map(|k| a[i][k] * half[j][k]).sum()))
+}
+
+/// R I Rᵀ.
+pub(crate) fn world_inertia(frame: &Frame<f64>, local: DMat3) -> DMat3 {
+    let r = frame.rotation.value();
+    r * local * r.transpose()
+}
+
+/// Momentum and angular momentum about the centre of mass of a part whose centre of mass is the frame's origin.
+pub(crate) fn part_momentum(frame: &Frame<f64>, mass: f64, inertia: DMat3) -> Wrench {
+    let Twist { linear, angular } = frame.twist();
+    Wrench { force: (mass * linear).into(), torque: (world_inertia(frame, inertia) * angular).into() }
+}

@@ -1,0 +1,323 @@
+//! Gathering: the world's bodies and potentials become islands of unknowns and terms.
+
+use glam::DVec3;
+
+use super::problem::{Rates, Unknown};
+use super::step::{Integrator, Scene, Solve};
+use crate::collide::{ContactPoint, Partner};
+use crate::dof::{ABSENT, BLOCK_RATES_MAX, BodyId, FigureBody, Frame, Inertia, Node, PartPoint, Placed};
+use crate::island::Place;
+use crate::potential::axle::AxleTerm;
+use crate::potential::ball_joint::BallJointTerm;
+use crate::potential::contact::ContactTerm;
+use crate::potential::pd::PdTerm;
+use crate::potential::spring::SpringTerm;
+use crate::potential::{Anchor, End, FIXED};
+use crate::settings::Settings;
+
+/// A body that takes part in this tick.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Active {
+    pub id: BodyId,
+    /// Its first block among all unknowns.
+    pub first: u32,
+    /// Its index among the figures of its island; [`ABSENT`] for particles and rigid bodies.
+    pub figure: u32,
+}
+
+/// Where a potential acts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Spot {
+    World,
+    /// The body with this index among the active ones.
+    Body(u32, PartPoint),
+}
+
+impl Integrator {
+    pub(super) fn gather_bodies(&mut self, scene: &mut Scene) {
+        let Settings { dt, gravity, .. } = *scene.settings;
+        self.unknowns.clear();
+        self.active.clear();
+        for body in scene.bodies.values_mut() {
+            body.is_wheel = false;
+        }
+        for axle in scene.potentials.axles.values() {
+            let carried = scene.bodies.get(axle.chassis).is_some_and(|chassis| !chassis.quarantined);
+            scene.bodies[axle.wheel].is_wheel = carried;
+        }
+        for &id in scene.order {
+            let body = &mut scene.bodies[id];
+            body.index = if body.quarantined { ABSENT } else { self.active.len() as u32 };
+            if !body.quarantined {
+                self.active.push(Active { id, first: self.unknowns.len() as u32, figure: ABSENT });
+                match &body.figure {
+                    None => self.unknowns.push(Unknown::Body(body.node(scene.state, dt, gravity))),
+                    Some(figure) => {
+                        let v = scene.state.v(body.slice);
+                        self.unknowns.extend(rates(figure, v, dt * gravity).map(Unknown::Rates));
+                    }
+                }
+            }
+            // Forces are for one tick, whether the body takes part in it or not.
+            (body.force, body.torque) = Default::default();
+        }
+    }
+
+    pub(super) fn build_islands(&mut self, scene: &Scene) {
+        self.islands.begin(self.unknowns.len());
+        self.couple_figures(scene);
+        let contacts = scene.contacts.iter().map(|c| contact_spots(scene, c));
+        let anchors = scene.potentials.pairs().map(|[a, b]| Some([spot(scene, a)?, spot(scene, b)?]));
+        let (mut near, mut far) = (std::mem::take(&mut self.scratch[0]), std::mem::take(&mut self.scratch[1]));
+        for [a, b] in contacts.chain(anchors).flatten() {
+            self.blocks_at(scene, a, &mut near);
+            self.blocks_at(scene, b, &mut far);
+            self.islands.couple_all(&near, &far);
+        }
+        self.scratch = [near, far];
+        self.islands.finish();
+        self.solves.resize_with(self.islands.len().max(self.solves.len()), Solve::default);
+        for (i, solve) in self.solves.iter_mut().take(self.islands.len()).enumerate() {
+            solve.clear(scene.settings);
+            let members = self.islands.members(i).iter();
+            solve.problem.unknowns.extend(members.map(|&m| self.unknowns[m as usize]));
+        }
+        self.place_figures(scene);
+    }
+
+    /// A figure's blocks are one island, whatever couples them.
+    fn couple_figures(&mut self, scene: &Scene) {
+        for active in &self.active {
+            let Some(FigureBody { dof, .. }) = &scene.bodies[active.id].figure else { continue };
+            let islands = &mut self.islands;
+            for i in 0..dof.blocks().len() as u32 {
+                islands.touch(active.first + i);
+                islands.unite(active.first, active.first + i);
+            }
+            let mut couple = |a: u32, b: u32| islands.couple(active.first + a, active.first + b);
+            dof.couplings(&mut |a, b| couple(a as u32, b as u32));
+            match dof.inertia() {
+                Inertia::Points(masses) => masses.off_diagonal.iter().for_each(|&(a, b, _)| couple(a, b)),
+                Inertia::Parts(parts) => {
+                    let q = scene.state.q(scene.bodies[active.id].slice);
+                    for (part, inertia) in (0..).zip(parts) {
+                        let mut movers = std::mem::take(&mut self.scratch[0]);
+                        movers.clear();
+                        let at = PartPoint { part, point: inertia.centre };
+                        dof.jacobian(at, q, &mut |block, _| movers.push(block as u32));
+                        for (i, &a) in movers.iter().enumerate() {
+                            movers[..i].iter().for_each(|&b| couple(a, b));
+                        }
+                        self.scratch[0] = movers;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Hands every figure to its island's problem.
+    fn place_figures(&mut self, scene: &Scene) {
+        let Settings { dt, gravity, .. } = *scene.settings;
+        for active in &mut self.active {
+            let body = &scene.bodies[active.id];
+            let Some(FigureBody { dof, .. }) = &body.figure else { continue };
+            let island = self.islands.place(active.first).island;
+            let figures = &mut self.solves[island as usize].problem.figures;
+            let blocks = (active.first..).take(dof.blocks().len()).map(|block| self.islands.place(block).index);
+            active.figure = figures.add(dof, blocks, scene.state.q(body.slice), scene.state.v(body.slice));
+            figures.attach_parts(active.figure, dt, gravity);
+        }
+    }
+
+    /// The blocks, among all unknowns, that move a spot.
+    fn blocks_at(&self, scene: &Scene, spot: Spot, blocks: &mut Vec<u32>) {
+        blocks.clear();
+        let Spot::Body(index, at) = spot else { return };
+        let Active { id, first, .. } = self.active[index as usize];
+        let body = &scene.bodies[id];
+        match &body.figure {
+            None => blocks.push(first),
+            Some(figure) => {
+                let q = scene.state.q(body.slice);
+                figure.dof.jacobian(at, q, &mut |block, _| blocks.push(first + block as u32));
+            }
+        }
+    }
+
+    /// The island of two spots, and their ends in it. `frozen` ends keep the derivatives of the start.
+    fn localise(&mut self, spots: [Spot; 2], frozen: bool) -> Option<(&mut Solve, [End; 2])> {
+        let place = |spot: Spot| match spot {
+            Spot::World => Place::FREE,
+            Spot::Body(index, _) => self.islands.place(self.active[index as usize].first),
+        };
+        let places = spots.map(place);
+        let island = places[0].island.min(places[1].island);
+        let solve = self.solves.get_mut(island as usize)?;
+        let mut end = |spot: Spot, place: Place| match spot {
+            Spot::World => End { frame: FIXED, point: DVec3::ZERO },
+            Spot::Body(index, at) => match self.active[index as usize].figure {
+                ABSENT => End { frame: place.index, point: at.point },
+                figure => {
+                    let attachment = solve.problem.figures.attach(figure, at, frozen);
+                    End { frame: solve.problem.len() as u32 + attachment, point: DVec3::ZERO }
+                }
+            },
+        };
+        let ends = [end(spots[0], places[0]), end(spots[1], places[1])];
+        Some((solve, ends))
+    }
+
+    /// As [`Integrator::localise`], for two anchors.
+    fn localise_anchors(&mut self, scene: &Scene, anchors: [Anchor; 2]) -> Option<(&mut Solve, [End; 2])> {
+        let spots = [spot(scene, anchors[0])?, spot(scene, anchors[1])?];
+        let (solve, mut ends) = self.localise(spots, false)?;
+        for (end, anchor) in ends.iter_mut().zip(anchors) {
+            if end.frame == FIXED {
+                end.point = anchor.point;
+            }
+        }
+        Some((solve, ends))
+    }
+
+    pub(super) fn gather_potentials(&mut self, scene: &Scene) {
+        self.gather_contacts(scene);
+        let Settings { dt, solver, .. } = scene.settings;
+        for desc in scene.potentials.springs.values() {
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let points = ends.map(|end| solve.start(end).place(end.point));
+            solve.problem.terms.springs.push(SpringTerm::new(ends, desc, points[0].distance(points[1])));
+        }
+        for (id, joint) in &scene.potentials.ball_joints {
+            let Some((solve, ends)) = self.localise_anchors(scene, [joint.desc.a, joint.desc.b]) else { continue };
+            let stiffness = solver.joint_stiffness * solve.reduced_mass(ends) / (dt * dt);
+            solve.problem.terms.ball_joints.push(BallJointTerm::new(ends, stiffness, joint.force));
+            solve.ball_joints.push(id);
+        }
+        for desc in scene.potentials.axles.values() {
+            let anchors = [desc.chassis, desc.wheel].map(|id| Anchor::body(id, DVec3::ZERO));
+            let Some((solve, ends)) = self.localise_anchors(scene, anchors) else { continue };
+            let frames = ends.map(|end| end.frame);
+            let nodes = [0, 1].map(|i| solve.node(frames[i]));
+            let [Some(chassis), Some(wheel)] = nodes else { continue };
+            let term = AxleTerm::new(frames, desc, [chassis, wheel], solver.joint_stiffness, *dt);
+            let spin = term.guess_spin([chassis, wheel], *dt);
+            if let Unknown::Body(node) = &mut solve.problem.unknowns[frames[1] as usize] {
+                node.guessed_spin = Some(spin);
+            }
+            solve.problem.terms.axles.push(term);
+        }
+        for (desc, gains) in scene.potentials.pds.values() {
+            let anchors = [Anchor::body(desc.body, DVec3::ZERO), Anchor::world(DVec3::ZERO)];
+            let Some((solve, [end, _])) = self.localise_anchors(scene, anchors) else { continue };
+            let (mass, position) = (solve.mass(end), solve.start(end).position.into());
+            solve.problem.terms.pds.push(PdTerm::new(end.frame, desc, *gains, mass, position, *dt));
+        }
+    }
+
+    fn gather_contacts(&mut self, scene: &Scene) {
+        let Settings { dt, contact: settings, .. } = scene.settings;
+        for (source, contact) in (0u32..).zip(scene.contacts.iter()) {
+            let Some(spots) = contact_spots(scene, contact) else { continue };
+            let Some((solve, ends)) = self.localise(spots, true) else { continue };
+            let frames = ends.map(|end| end.frame);
+            let arms = ends.map(|end| solve.arm(end, contact.position));
+            let speeds = [0, 1].map(|i| solve.start(ends[i]).twist().at(arms[i]));
+            let closing = contact.normal.dot(speeds[0] - speeds[1]);
+            let term = ContactTerm::new(frames, contact, arms, solve.reduced_mass(ends), closing, settings, *dt);
+            solve.problem.terms.contacts.push(term);
+            solve.contacts.push(source);
+        }
+    }
+}
+
+impl Solve {
+    /// The particle or rigid body of a frame.
+    fn node(&self, frame: u32) -> Option<&Node> {
+        match self.problem.unknowns.get(frame as usize) {
+            Some(Unknown::Body(node)) => Some(node),
+            _ => None,
+        }
+    }
+
+    /// The frame of an end at the start of the tick.
+    fn start(&self, end: End) -> Frame<f64> {
+        if let Some(node) = self.node(end.frame) {
+            return node.start_frame();
+        }
+        let attachment = (end.frame as usize).checked_sub(self.problem.len());
+        let attachment = attachment.and_then(|k| self.problem.figures.attachments.get(k));
+        attachment.map_or(Frame::WORLD, |attachment| attachment.start)
+    }
+
+    /// What resists a force at an end, kg; infinite for the world.
+    fn mass(&self, end: End) -> f64 {
+        if let Some(node) = self.node(end.frame) {
+            return node.mass;
+        }
+        let attachment = (end.frame as usize).checked_sub(self.problem.len());
+        let attachment = attachment.and_then(|k| self.problem.figures.attachments.get(k));
+        attachment.map_or(f64::INFINITY, |attachment| attachment.mass)
+    }
+
+    /// Reduced mass of two ends, kg; of the one that moves where the other is the world.
+    fn reduced_mass(&self, [a, b]: [End; 2]) -> f64 {
+        (self.mass(a).recip() + self.mass(b).recip()).recip()
+    }
+
+    /// From an end's origin to a contact point; none for what does not turn.
+    fn arm(&self, end: End, point: DVec3) -> DVec3 {
+        let turns = end.frame != FIXED && self.node(end.frame).is_none_or(|node| node.rotates);
+        if turns { point - DVec3::from(self.start(end).position) } else { DVec3::ZERO }
+    }
+}
+
+/// A figure's rates, block by block.
+fn rates<'a>(figure: &'a FigureBody, v: &'a [f64], fall: DVec3) -> impl Iterator<Item = Rates> + 'a {
+    let points = matches!(figure.dof.inertia(), Inertia::Points(_));
+    let mut offset = 0;
+    figure.dof.blocks().iter().map(move |size| {
+        let range = offset..offset + usize::from(size.rates);
+        offset = range.end;
+        let padded = |numbers: &[f64]| {
+            let mut block = [0.0; BLOCK_RATES_MAX];
+            block[..numbers.len()].copy_from_slice(numbers);
+            block
+        };
+        let before = padded(&v[range.clone()]);
+        let change = padded(&figure.change[range.clone()]);
+        let mut target = before;
+        if points {
+            (0..3).for_each(|i| target[i] += fall[i]);
+        }
+        Rates {
+            size: size.rates,
+            before,
+            target,
+            repeated: std::array::from_fn(|i| before[i] + change[i]),
+            masses: padded(&figure.masses[range]),
+            body_mass: figure.mass,
+        }
+    })
+}
+
+/// Where an anchor acts; `None` where its body takes no part.
+fn spot(scene: &Scene, anchor: Anchor) -> Option<Spot> {
+    let Some(id) = anchor.body else { return Some(Spot::World) };
+    let body = scene.bodies.get(id).filter(|body| body.index != ABSENT)?;
+    Some(Spot::Body(body.index, PartPoint { part: anchor.part, point: anchor.point }))
+}
+
+/// Where a contact acts: at the frames of the two colliders.
+fn contact_spots(scene: &Scene, contact: &ContactPoint) -> Option<[Spot; 2]> {
+    let spot = |serial: u32| {
+        let place = scene.placed.binary_search_by_key(&serial, |placed| placed.serial).ok()?;
+        let Placed { body, at, .. } = scene.placed[place];
+        let index = scene.bodies[body].index;
+        (index != ABSENT).then_some(Spot::Body(index, at))
+    };
+    let b = match contact.b {
+        Partner::Body(serial) => spot(serial)?,
+        Partner::Static(_) => Spot::World,
+    };
+    Some([spot(contact.a)?, b])
+}

@@ -1,0 +1,246 @@
+//! Every potential three ways: as written, by automatic differentiation, by finite differences.
+
+use glam::DQuat;
+use proptest::prelude::*;
+
+use super::axle::AxleTerm;
+use super::ball_joint::BallJointTerm;
+use super::contact::ContactTerm;
+use super::pd::PdTerm;
+use super::spring::SpringTerm;
+use super::*;
+use crate::autodiff::Dual;
+use crate::collide::ContactPoint;
+use crate::dof::{Node, Pose};
+use crate::settings::ContactSettings;
+
+pub(super) const DT: f64 = 1.0 / 30.0;
+
+/// The frame after a displacement of size `h` along its `i`th coordinate of six.
+fn moved(frame: &Frame<f64>, i: usize, h: f64) -> Frame<f64> {
+    let mut frame = *frame;
+    let axis = DVec3::AXES[i % 3];
+    if i < 3 {
+        frame.position += (axis * h).into();
+        frame.linear += (axis * (h / DT)).into();
+    } else {
+        let turned = DMat3::from_quat(DQuat::from_scaled_axis(axis * h)) * frame.rotation.value();
+        frame.rotation = crate::autodiff::Mat3::constant(turned);
+        frame.angular += (axis * (h / DT)).into();
+    }
+    frame
+}
+
+fn unit(i: usize) -> Twist {
+    let axis = DVec3::AXES[i % 3];
+    if i < 3 { Twist { linear: axis, ..Twist::REST } } else { Twist { angular: axis, ..Twist::REST } }
+}
+
+fn flat(wrenches: [Wrench; 2]) -> [f64; 12] {
+    let [a, b] = wrenches.map(|w| [w.force.x, w.force.y, w.force.z, w.torque.x, w.torque.y, w.torque.z]);
+    std::array::from_fn(|i| if i < 6 { a[i] } else { b[i - 6] })
+}
+
+fn shifted(at: &[Frame<f64>; 2], i: usize, h: f64) -> [Frame<f64>; 2] {
+    let mut at = *at;
+    at[i / 6] = moved(&at[i / 6], i % 6, h);
+    at
+}
+
+fn evaluate(term: &impl Term, at: &[Frame<f64>; 2]) -> (f64, [f64; 12]) {
+    let (energy, wrenches) = term.evaluate(DT, [&at[0], &at[1]]);
+    (energy, flat(wrenches))
+}
+
+/// The gradient, as written, is the energy's, by automatic differentiation and by central differences.
+pub(super) fn check_gradient(term: &impl Term, at: &[Frame<f64>; 2]) {
+    let (_, written) = evaluate(term, at);
+    let size = written.iter().fold(1e-9, |size: f64, g| size.max(g.abs()));
+    let seed = |frame: usize| {
+        let along = |i: usize| if i / 6 == frame { unit(i % 6) } else { Twist::REST };
+        at[frame].along::<12>(std::array::from_fn(along), DT)
+    };
+    let automatic: Dual<12> = term.evaluate(DT, [&seed(0), &seed(1)]).0;
+    for (i, expected) in written.into_iter().enumerate() {
+        let h = 1e-6;
+        let difference = (evaluate(term, &shifted(at, i, h)).0 - evaluate(term, &shifted(at, i, -h)).0) / (2.0 * h);
+        assert!((automatic.tangent[i] - expected).abs() < 1e-9 * size, "{i}: AD {} {expected}", automatic.tangent[i]);
+        assert!((difference - expected).abs() < 1e-4 * size, "coordinate {i}: {difference} {expected}");
+    }
+}
+
+/// Derivative of the gradient by automatic differentiation, row i column j; checked against central differences to
+/// `accuracy` of its largest diagonal entry.
+pub(super) fn automatic_hessian(term: &impl Term, at: &[Frame<f64>; 2], accuracy: f64) -> [[f64; 12]; 12] {
+    let mut hessian = [[0.0; 12]; 12];
+    for j in 0..12 {
+        let seed = |frame: usize| {
+            let direction = if j / 6 == frame { unit(j % 6) } else { Twist::REST };
+            at[frame].along::<1>([direction], DT)
+        };
+        let (_, wrenches) = term.evaluate(DT, [&seed(0), &seed(1)]);
+        for (frame, w) in wrenches.into_iter().enumerate() {
+            let column = [w.force.x, w.force.y, w.force.z, w.torque.x, w.torque.y, w.torque.z];
+            (0..6).for_each(|i| hessian[6 * frame + i][j] = column[i].tangent[0]);
+        }
+    }
+    let size = (0..12).map(|i| hessian[i][i].abs()).fold(1e-9, f64::max);
+    for j in 0..12 {
+        let h = 1e-7;
+        let (above, below) = (evaluate(term, &shifted(at, j, h)).1, evaluate(term, &shifted(at, j, -h)).1);
+        for i in 0..12 {
+            let difference = (above[i] - below[i]) / (2.0 * h);
+            assert!((difference - hessian[i][j]).abs() < accuracy * size, "({i}, {j}): {difference} {}", hessian[i][j]);
+        }
+    }
+    hessian
+}
+
+/// The Hessian, as written, is the automatic one, to a fraction of its largest entry.
+pub(super) fn check_hessian(term: &impl Term, at: &[Frame<f64>; 2], accuracy: f64) {
+    let automatic = automatic_hessian(term, at, accuracy);
+    let PairBlocks { aa, ab, bb } = term.hessian(DT, [&at[0], &at[1]]);
+    let size = (0..12).map(|i| automatic[i][i].abs()).fold(1e-9, f64::max);
+    for (i, j) in (0..12).flat_map(|i| (0..12).map(move |j| (i, j))) {
+        let written = match (i / 6, j / 6) {
+            (0, 0) => aa[i][j],
+            (0, _) => ab[i][j - 6],
+            (_, 0) => ab[j][i - 6],
+            _ => bb[i - 6][j - 6],
+        };
+        assert!(
+            (written - automatic[i][j]).abs() < accuracy * size,
+            "({i}, {j}): {written} {} of {size}",
+            automatic[i][j]
+        );
+    }
+}
+
+pub(super) fn vector() -> impl Strategy<Value = DVec3> {
+    prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from_array)
+}
+
+pub(super) fn frame() -> impl Strategy<Value = Frame<f64>> {
+    (vector(), vector(), vector(), vector()).prop_map(|(position, turn, linear, angular)| {
+        let rotation = DMat3::from_quat(DQuat::from_scaled_axis(turn * 2.0));
+        Frame::new(position * 3.0, rotation, linear, angular)
+    })
+}
+
+pub(super) fn ends(a: DVec3, b: DVec3) -> [End; 2] {
+    [End { frame: 0, point: a }, End { frame: 1, point: b }]
+}
+
+fn node(mass: f64, inertia: DVec3, at: &Frame<f64>) -> Node {
+    let start = Pose { position: at.position.into(), rotation: DQuat::from_mat3(&at.rotation.value()) };
+    Node {
+        start,
+        free_rotation: start.rotation,
+        free_spin: DVec3::ZERO,
+        target: Twist::REST,
+        before: Twist::REST,
+        impulse: Twist::REST,
+        mass,
+        inertia: DMat3::from_diagonal(inertia),
+        inverse_inertia: DMat3::from_diagonal(inertia.recip()),
+        rotates: true,
+        wheel_axis: None,
+        guessed_spin: None,
+    }
+}
+
+fn spring(points: [DVec3; 2], rest_length: f64, damping: f64, start_length: f64) -> SpringTerm {
+    // The anchors' bodies do not matter to the term.
+    let [a, b] = points.map(Anchor::world);
+    let desc = SpringDesc { a, b, rest_length, stiffness: 300.0, damping };
+    SpringTerm::new(ends(points[0], points[1]), &desc, start_length)
+}
+
+fn contact(normal: DVec3, gap: f64, anchor: DVec3, arms: [DVec3; 2], normal_force: f64) -> ContactTerm {
+    let mut point = ContactPoint::at(DVec3::ZERO, normal, gap, 0.7);
+    (point.anchor, point.normal_force) = (anchor - normal * normal.dot(anchor), normal_force);
+    ContactTerm::new([0, 1], &point, arms, 2.0, 0.0, &ContactSettings::default(), DT)
+}
+
+proptest! {
+    #[test]
+    fn spring_derives(a in vector(), b in vector(), rest in 0.0..2.0, l0 in 0.1..2.0, t in frame(), u in frame()) {
+        prop_assume!((t.place(a) - u.place(b)).length() > 0.1);
+        let term = spring([a, b], rest, 7.0, l0);
+        check_gradient(&term, &[t, u]);
+        automatic_hessian(&term, &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn spring_between_origins_has_the_exact_hessian_in_tension(t in frame(), u in frame()) {
+        prop_assume!(DVec3::from(t.position - u.position).length() > 0.1);
+        check_hessian(&spring([DVec3::ZERO; 2], 0.0, 0.0, 0.0), &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn ball_joint_derives(a in vector(), b in vector(), t in frame(), u in frame()) {
+        let term = BallJointTerm::new(ends(a, b), 1e3, DVec3::ZERO);
+        check_gradient(&term, &[t, u]);
+        automatic_hessian(&term, &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn closed_ball_joint_has_the_exact_hessian(a in vector(), b in vector(), t in frame(), mut u in frame()) {
+        u.position = t.position + t.arm(a) - u.arm(b);
+        let mut term = BallJointTerm::new(ends(a, b), 1e3, DVec3::ZERO);
+        term.relinearise(DT, [&t, &u]);
+        check_hessian(&term, &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn axle_derives(t in frame(), u in frame(), hub in vector(), steer in -1.0..1.0, target in -3.0..3.0, brake in 0.0..200.0) {
+        let control = AxleControl { steer, drive: Motor { target_speed: target, gain: 60.0, max_torque: 90.0 }, brake };
+        let (chassis, wheel) = (BodyId::default(), BodyId::default());
+        let desc = AxleDesc { chassis, wheel, hub, stiffness: 400.0, damping: 30.0, control };
+        let nodes = [node(10.0, DVec3::new(1.0, 2.0, 2.5), &t), node(1.0, DVec3::new(0.1, 0.1, 0.2), &u)];
+        let term = AxleTerm::new([0, 1], &desc, [&nodes[0], &nodes[1]], 3.0, DT);
+        check_gradient(&term, &[t, u]);
+        automatic_hessian(&term, &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn contact_derives(
+        n in vector(), gap in -0.05..0.02, anchor in vector(), a in vector(), b in vector(), force in 0.0..1e4,
+        t in frame(), u in frame(),
+    ) {
+        prop_assume!(n.length() > 0.1);
+        let slow = |f: Frame<f64>| Frame { linear: f.linear * 0.3, angular: f.angular * 0.3, ..f };
+        let term = contact(n.normalize(), gap, anchor * 0.01, [a, b], force);
+        check_gradient(&term, &[slow(t), slow(u)]);
+    }
+
+    #[test]
+    fn frictionless_contact_has_the_exact_hessian(n in vector(), a in vector(), b in vector(), t in frame(), u in frame()) {
+        prop_assume!(n.length() > 0.1);
+        check_hessian(&contact(n.normalize(), -0.1, DVec3::ZERO, [a, b], 0.0), &[t, u], 1e-4);
+    }
+
+    #[test]
+    fn pd_controller_derives(target in vector(), max_force in 1.0..1e4, t in frame()) {
+        let control = PdControl { target, target_velocity: DVec3::X };
+        let desc = PdDesc { body: BodyId::default(), frequency: 1.0, damping_ratio: 1.0, max_force, control };
+        let term = PdTerm::new(0, &desc, PdGains::new(1.0, 1.0, DT).unwrap(), 5.0, t.position.into(), DT);
+        check_gradient(&term, &[t, Frame::WORLD]);
+    }
+
+    #[test]
+    fn geometric_stiffness_is_the_positive_part(f in vector(), r in vector()) {
+        let along = f.dot(r);
+        let whole = (outer(f, r) + outer(r, f)) * 0.5 - DMat3::from_diagonal(DVec3::splat(along));
+        let positive = geometric_stiffness(f, r);
+        let negative = positive - whole;
+        // Both parts are semidefinite, and they are orthogonal to each other.
+        for part in [positive, negative] {
+            for x in [DVec3::X, DVec3::Y, DVec3::Z, f, r, f + r, f - r, f.cross(r)] {
+                prop_assert!(x.dot(part * x) > -1e-9, "{part}");
+            }
+        }
+        let product = positive * negative;
+        prop_assert!(product.x_axis.length() + product.y_axis.length() + product.z_axis.length() < 1e-6);
+    }
+}
