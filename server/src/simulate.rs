@@ -174,7 +174,7 @@ impl Summary {
         self.wall_ms.push(wall_ms);
         self.total.contacts += tick.contacts;
         self.total.islands += tick.islands;
-        self.total.newton_iterations += tick.newton_iterations;
+        self.total.iterations += tick.iterations;
         self.total.linear_iterations += tick.linear_iterations;
         self.total.unconverged_islands += tick.unconverged_islands;
         self.total.quarantined += tick.quarantined;
@@ -222,7 +222,7 @@ impl Summary {
             "worst_residual_m_per_s": self.total.residual,
             "contacts_per_tick": self.mean(self.total.contacts),
             "islands_per_tick": self.mean(self.total.islands),
-            "newton_iterations_per_tick": self.mean(self.total.newton_iterations),
+            "newton_iterations_per_tick": self.mean(self.total.iterations),
             "linear_iterations_per_tick": self.mean(self.total.linear_iterations),
             "unconverged_islands": self.total.unconverged_islands,
             "quarantined": self.total.quarantined,
@@ -260,7 +260,7 @@ impl Summary {
             ("worst joint gap", format!("{:.4} mm", 1e3 * self.total.worst_joint_gap)),
             ("contacts a tick", format!("{:.1}", self.mean(self.total.contacts))),
             ("islands a tick", format!("{:.1}", self.mean(self.total.islands))),
-            ("Newton iterations a tick", format!("{:.2}", self.mean(self.total.newton_iterations))),
+            ("Newton iterations a tick", format!("{:.2}", self.mean(self.total.iterations))),
             ("linear iterations a tick", format!("{:.2}", self.mean(self.total.linear_iterations))),
             ("unconverged islands", self.total.unconverged_islands.to_string()),
             ("quarantined bodies", self.total.quarantined.to_string()),

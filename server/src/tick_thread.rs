@@ -140,7 +140,7 @@ impl Outside {
         self.record.bodies = count(report.bodies);
         self.record.dof_awake = count(report.dof);
         self.record.contacts = count(report.contacts);
-        self.record.newton_iterations = count(report.newton_iterations);
+        self.record.newton_iterations = count(report.iterations);
         self.record.linear_iterations = count(report.linear_iterations);
     }
 }

@@ -19,6 +19,16 @@ pub enum SimError {
         /// What the handle was for.
         what: &'static str,
     },
+    /// A name that is not in the list.
+    #[error("{what} {name:?} is unknown, known are {known}")]
+    UnknownName {
+        /// What was named.
+        what: &'static str,
+        /// As it was given, its first 64 characters.
+        name: String,
+        /// The list.
+        known: String,
+    },
     /// Something that makes no sense between these bodies.
     #[error("{what}")]
     Unusable {

@@ -33,7 +33,7 @@ pub use collide::{Collider, ContactView, Shape, StaticDesc, StaticId};
 pub use dof::{BodyId, Dof, DofKind, FigureDesc, Frame, PartCollider, PartPoint, ParticleDesc, RigidBodyDesc};
 pub use error::SimError;
 pub use glam::{DMat3, DQuat, DVec3};
-pub use integrate::StepReport;
+pub use integrate::{Method, Preconditioner, StepReport, StoppedBecause};
 pub use potential::{
     Anchor, AxleControl, AxleDesc, AxleId, BallJointDesc, BallJointId, Motor, PdControl, PdDesc, PdId, SpringDesc,
     SpringId,

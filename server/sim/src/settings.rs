@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::error::{SimError, require, require_vector};
+use crate::integrate::{Method, Preconditioner};
 
 /// Parameters of a [`World`](crate::World).
 #[derive(Clone, Debug, PartialEq)]
@@ -22,12 +23,24 @@ pub struct Settings {
 /// Parameters of the integrator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolverSettings {
-    /// Newton stops when no body's residual is larger, m/s. 1e-2 is invisible in piles, but sticks what should slide.
+    /// How residuals are made zero.
+    pub method: Method,
+    /// Of conjugate gradients, in [`Method::TruncatedNewton`] and [`Method::NonlinearConjugateGradient`].
+    pub preconditioner: Preconditioner,
+    /// A solver stops when no body's residual is larger, m/s. 1e-2 is invisible in piles, but sticks what should slide.
     pub tolerance: f64,
-    /// Most Newton iterations an island gets. Below 8, impacts leave joints open by centimetres.
-    pub newton_iterations: usize,
+    /// Most iterations an island gets; `None` is the method's own limit, [`Method::iterations`].
+    pub iterations: Option<usize>,
+    /// Block operations (see [`StepReport::work`](crate::StepReport::work)) that a tick may take; `None` is any number.
+    /// Islands share them by size, and each ends at the best state that it has seen; the start and the last iteration of
+    /// each may exceed its share.
+    pub budget: Option<u64>,
     /// The linear solver stops when its residual has shrunk to this fraction: the truncation of truncated Newton.
     pub forcing: f64,
+    /// ω of [`Method::Sor`] and [`Preconditioner::Ssor`], above 0 and below 2.
+    pub relaxation: f64,
+    /// Sweeps of an iteration of [`Method::GaussSeidel`] and [`Method::Sor`].
+    pub sweeps: usize,
     /// Stiffness of joints, in reduced masses per dt². 1e4 stretches a loaded chain by 2 %, 1e5 tears ragdolls.
     pub joint_stiffness: f64,
 }
@@ -67,9 +80,12 @@ impl Settings {
         require_vector(self.gravity, "gravity")?;
         require((1..=64).contains(&self.threads), "threads", self.threads as f64, "1 to 64")?;
         require(solver.tolerance > 0.0, "solver.tolerance", solver.tolerance, "above 0 m/s")?;
-        let newton = solver.newton_iterations;
-        require((1..=1000).contains(&newton), "solver.newton_iterations", newton as f64, "1 to 1000")?;
+        let iterations = solver.iterations();
+        require((1..=100_000).contains(&iterations), "solver.iterations", iterations as f64, "1 to 100000")?;
         require((1e-12..1.0).contains(&solver.forcing), "solver.forcing", solver.forcing, "1e-12 to below 1")?;
+        let relaxes = solver.relaxation > 0.0 && solver.relaxation < 2.0;
+        require(relaxes, "solver.relaxation", solver.relaxation, "above 0, below 2")?;
+        require((1..=1000).contains(&solver.sweeps), "solver.sweeps", solver.sweeps as f64, "1 to 1000")?;
         require(solver.joint_stiffness > 0.0, "solver.joint_stiffness", solver.joint_stiffness, "above 0")?;
         require(contact.normal_stiffness > 0.0, "contact.normal_stiffness", contact.normal_stiffness, "above 0")?;
         require(contact.tangent_stiffness > 0.0, "contact.tangent_stiffness", contact.tangent_stiffness, "above 0")?;
@@ -79,9 +95,26 @@ impl Settings {
     }
 }
 
+impl SolverSettings {
+    /// Most iterations an island gets.
+    pub fn iterations(&self) -> usize {
+        self.iterations.unwrap_or(self.method.iterations())
+    }
+}
+
 impl Default for SolverSettings {
     fn default() -> Self {
-        Self { tolerance: 1e-3, newton_iterations: 16, forcing: 0.1, joint_stiffness: 3e4 }
+        Self {
+            method: Method::default(),
+            preconditioner: Preconditioner::default(),
+            tolerance: 1e-3,
+            iterations: None,
+            budget: None,
+            forcing: 0.1,
+            relaxation: 1.3,
+            sweeps: 4,
+            joint_stiffness: 3e4,
+        }
     }
 }
 

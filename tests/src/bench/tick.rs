@@ -86,7 +86,7 @@ impl Measured {
         }
         self.times[STAGE_NAMES.len()].record(nanoseconds(marks[0], marks[STAGE_NAMES.len()]))?;
         self.total.contacts += tick.contacts;
-        self.total.newton_iterations += tick.newton_iterations;
+        self.total.iterations += tick.iterations;
         self.total.linear_iterations += tick.linear_iterations;
         self.total.evaluations += tick.evaluations;
         self.total.unconverged_islands += tick.unconverged_islands;
@@ -106,7 +106,7 @@ impl Measured {
         let mean = |sum: usize| sum as f64 / f64::from(ticks);
         for (name, key, value) in [
             ("contacts a tick", "contacts_per_tick", mean(self.total.contacts)),
-            ("Newton iterations a tick", "newton_iterations_per_tick", mean(self.total.newton_iterations)),
+            ("Newton iterations a tick", "newton_iterations_per_tick", mean(self.total.iterations)),
             ("linear iterations a tick", "linear_iterations_per_tick", mean(self.total.linear_iterations)),
             ("residual evaluations a tick", "evaluations_per_tick", mean(self.total.evaluations)),
             ("unconverged islands a tick", "unconverged_islands_per_tick", mean(self.total.unconverged_islands)),

@@ -62,7 +62,7 @@ fn settings(arguments: &Arguments) -> Result<Settings, String> {
         };
         let (key, value) = option.split_once('=').ok_or_else(unknown)?;
         match key {
-            "newton" => settings.solver.newton_iterations = parsed(option, value, "a whole number")?,
+            "newton" => settings.solver.iterations = Some(parsed(option, value, "a whole number")?),
             "tol" => settings.solver.tolerance = parsed(option, value, "a number")?,
             "forcing" => settings.solver.forcing = parsed(option, value, "a number")?,
             "kj" => settings.solver.joint_stiffness = parsed(option, value, "a number")?,

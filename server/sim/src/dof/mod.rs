@@ -217,6 +217,12 @@ impl Node {
         Twist { linear, angular: self.target.angular + self.impulse.angular }
     }
 
+    /// The twist of a momentum.
+    pub fn divide_by_mass(&self, momentum: Twist) -> Twist {
+        let angular = if self.rotates { self.inverse_inertia * momentum.angular } else { DVec3::ZERO };
+        Twist { linear: momentum.linear / self.mass, angular }
+    }
+
     /// Frame at the start of the tick.
     pub fn start_frame(&self) -> Frame<f64> {
         let Pose { position, rotation } = self.start;

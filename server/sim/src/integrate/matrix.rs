@@ -6,6 +6,7 @@
 use super::block::{Block, Entry, multiply_add, transposed_multiply_add, zero};
 use super::figure::{Figures, pulled_back};
 use super::problem::{Problem, Unknown, Visitor, pair};
+use super::solver::work::block;
 use crate::dof::{Columns, Frame};
 use crate::potential::{FIXED, FrameIndex, PairBlocks, Term};
 
@@ -87,6 +88,11 @@ impl<const D: usize> Matrix<D> {
                 transposed_multiply_add(&self.lower[k], &x[i], &mut y[j]);
             }
         }
+    }
+
+    /// Multiply-adds of a product with a vector.
+    pub fn multiply_work(&self) -> u64 {
+        (self.diagonal.len() + 2 * self.lower.len()) as u64 * block(D)
     }
 
     /// Places of row i in `columns` and `lower`.
@@ -294,6 +300,12 @@ pub(super) mod tests {
         pairs
     }
 
+    /// Any blocks below the diagonal of `n` rows, sorted by row.
+    pub fn pattern(n: u32) -> impl Strategy<Value = Vec<(u32, u32)>> {
+        prop::collection::btree_set((1..n, 0..n - 1), 0..20)
+            .prop_map(|pairs| pairs.into_iter().filter(|(row, column)| column < row).collect())
+    }
+
     pub fn entries(n: usize) -> Vec<Entry<D>> {
         (0..n).map(|i| std::array::from_fn(|j| 1.0 + (i * D + j) as f64 * 0.37)).collect()
     }
@@ -309,11 +321,10 @@ pub(super) mod tests {
     proptest! {
         #[test]
         fn the_sparse_product_is_the_dense_one(
-            wanted in prop::collection::btree_set((1u32..8, 0u32..7), 0..20),
+            pairs in pattern(8),
             numbers in prop::collection::vec(-1.0..1.0f64, 40),
         ) {
             let n = 8;
-            let pairs: Vec<_> = wanted.into_iter().filter(|(row, column)| column < row).collect();
             let (matrix, dense) = matrix(n, &pairs, &numbers);
             let x = entries(n);
             let mut product = vec![[0.0; D]; n];

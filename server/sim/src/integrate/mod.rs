@@ -1,22 +1,24 @@
 //! Implicit Euler: from Q0, Q0' and the potentials to Q1, Q1' (the talk's "BOOM!").
 //!
-//! `problem` is an island with its potentials as one residual; `newton` makes the residual zero (the Cel Damage
-//! solver: truncated Newton), with the `line_search`, the sparse `matrix` and the preconditioned `conjugate_gradient`
-//! under it.
+//! `problem` is an island with its potentials as one residual; a `solver` makes the residual zero, with the
+//! `line_search`, the sparse `matrix`, its `factorization` and the preconditioned `conjugate_gradient` under it.
 //! Islands share nothing while they are solved, so that threads cannot change the result.
 
 pub(crate) mod block;
 mod conjugate_gradient;
+mod factorization;
 pub(crate) mod figure;
 mod gather;
 mod line_search;
 mod matrix;
-mod newton;
 mod preconditioner;
 pub(crate) mod problem;
+mod solver;
 mod step;
 mod vector;
 
+pub use solver::StoppedBecause;
+pub use solver::method::{Method, Preconditioner};
 pub(crate) use step::{Integrator, Scene};
 
 /// What the last integration did.
@@ -30,14 +32,19 @@ pub struct StepReport {
     pub dof: usize,
     /// Contact points.
     pub contacts: usize,
-    /// Newton iterations, summed over islands.
-    pub newton_iterations: usize,
+    /// Iterations of the solver, summed over islands.
+    pub iterations: usize,
     /// Iterations of the linear solver, summed over islands.
     pub linear_iterations: usize,
     /// Evaluations of the residual, summed over islands.
     pub evaluations: usize,
+    /// Block operations, summed over islands: a 3×3 block times a vector, or as much of something else. Counted, so the
+    /// same on every machine.
+    pub work: u64,
     /// Islands that stopped above the tolerance.
     pub unconverged_islands: usize,
+    /// Islands that stopped because their share of the budget was used up.
+    pub out_of_budget_islands: usize,
     /// Largest residual of any body at the end, m/s.
     pub residual: f64,
     /// Deepest contact at the end of the tick, m.

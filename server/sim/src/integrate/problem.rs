@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::block::Entry;
+use super::block::{Entry, dot};
 use super::figure::Figures;
 use crate::autodiff::Dual;
 use crate::dof::{BLOCK_RATES_MAX, Frame, Node, Twist};
@@ -85,7 +85,8 @@ pub(super) enum Guess {
 }
 
 impl Guess {
-    pub const ALL: [Self; 4] = [Self::Target, Self::Before, Self::Rest, Self::Repeated];
+    /// What rests or moves evenly is solved by the first.
+    pub const ALL: [Self; 4] = [Self::Repeated, Self::Target, Self::Before, Self::Rest];
 }
 
 impl Unknown {
@@ -114,6 +115,16 @@ impl Unknown {
         match self {
             Self::Body(node) => node.rotates,
             Self::Rates(rates) => rates.size > 3,
+        }
+    }
+
+    /// The rates of a momentum; of a figure's, each rate by itself.
+    fn divide_by_mass<const D: usize>(&self, momentum: &Entry<D>) -> Entry<D> {
+        match self {
+            Self::Body(node) => entry_of(node.divide_by_mass(twist_of(momentum))),
+            Self::Rates(rates) => {
+                std::array::from_fn(|i| if i < usize::from(rates.size) { momentum[i] / rates.masses[i] } else { 0.0 })
+            }
         }
     }
 
@@ -233,6 +244,18 @@ impl Problem {
                 }
             }
         }
+    }
+
+    /// v ← M⁻¹ p, rates out of momenta. Of figures, M is the diagonal.
+    pub(super) fn divide_by_mass<const D: usize>(&self, p: &[Entry<D>], v: &mut Vec<Entry<D>>) {
+        v.clear();
+        v.extend(self.unknowns.iter().zip(p).map(|(unknown, p)| unknown.divide_by_mass(p)));
+    }
+
+    /// ½ RᵀM⁻¹R: the kinetic energy of the momentum that is missing, J.
+    pub(super) fn merit<const D: usize>(&self, residual: &[Entry<D>]) -> f64 {
+        let missing = |(unknown, r): (&Unknown, &Entry<D>)| dot(r, &unknown.divide_by_mass(r));
+        0.5 * self.unknowns.iter().zip(residual).map(missing).sum::<f64>()
     }
 
     /// Takes what is frozen during a Newton iteration from the candidate.

@@ -7,8 +7,8 @@ use slotmap::SlotMap;
 
 use super::StepReport;
 use super::gather::Active;
-use super::newton::{Newton, NewtonInfo};
 use super::problem::{Problem, Unknown};
+use super::solver::{SolveReport, Solvers, StoppedBecause};
 use crate::collide::ContactPoint;
 use crate::dof::{Body, BodyId, Placed, Twist};
 use crate::island::Islands;
@@ -36,9 +36,11 @@ pub(crate) struct Scene<'a> {
 #[derive(Default)]
 pub(super) struct Solve {
     pub problem: Problem,
-    rigid: Newton<6>,
-    particles: Newton<3>,
-    info: NewtonInfo,
+    rigid: Solvers<6>,
+    particles: Solvers<3>,
+    /// Share of the tick's budget, block operations.
+    budget: Option<u64>,
+    report: SolveReport,
     /// Index of each contact term among the world's contacts.
     pub contacts: Vec<u32>,
     pub ball_joints: Vec<BallJointId>,
@@ -76,12 +78,13 @@ impl Integrator {
 
     fn solve(&mut self, settings: &Settings) {
         let solves = &mut self.solves[..self.islands.len()];
+        share_budget(solves, settings.solver.budget);
         let solver = &settings.solver;
         let run = |solve: &mut Solve| {
-            solve.info = if solve.problem.unknowns.iter().any(Unknown::is_wide) {
-                solve.rigid.solve(&mut solve.problem, solver)
+            solve.report = if solve.problem.unknowns.iter().any(Unknown::is_wide) {
+                solve.rigid.solve(&mut solve.problem, solver, solve.budget)
             } else {
-                solve.particles.solve(&mut solve.problem, solver)
+                solve.particles.solve(&mut solve.problem, solver, solve.budget)
             };
         };
         match &self.pool {
@@ -157,11 +160,25 @@ impl Solve {
             report.worst_joint_gap = report.worst_joint_gap.max(term.gap(problem.pair(term)));
         }
         report.contacts += self.contacts.len();
-        report.newton_iterations += self.info.newton_iterations;
-        report.linear_iterations += self.info.linear_iterations;
-        report.evaluations += self.info.evaluations;
-        report.unconverged_islands += usize::from(!self.info.converged);
-        report.residual = report.residual.max(self.info.residual);
+        let SolveReport { iterations, linear_iterations, evaluations, work, residual, stopped_because, .. } =
+            self.report;
+        report.iterations += iterations;
+        report.linear_iterations += linear_iterations;
+        report.evaluations += evaluations;
+        report.work += work;
+        report.unconverged_islands += usize::from(stopped_because != StoppedBecause::Tolerance);
+        report.out_of_budget_islands += usize::from(stopped_because == StoppedBecause::Budget);
+        report.residual = report.residual.max(residual);
+    }
+}
+
+/// Gives every island the share of `budget` that its bodies and contacts are of all.
+fn share_budget(solves: &mut [Solve], budget: Option<u64>) {
+    let size = |solve: &Solve| (solve.problem.len() + solve.contacts.len()) as u128;
+    let all: u128 = solves.iter().map(size).sum();
+    for solve in solves {
+        // No share is larger than the whole, so it fits.
+        solve.budget = budget.map(|budget| (u128::from(budget) * size(solve) / all.max(1)) as u64);
     }
 }
 

@@ -15,3 +15,23 @@ pub(super) fn add_scaled<const D: usize>(y: &mut [Entry<D>], a: f64, x: &[Entry<
         }
     }
 }
+
+/// y ← a y + x.
+pub(super) fn scale_and_add<const D: usize>(y: &mut [Entry<D>], a: f64, x: &[Entry<D>]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        for (y, x) in y.iter_mut().zip(x) {
+            *y = x + a * *y;
+        }
+    }
+}
+
+/// x ← a x.
+pub(super) fn scale<const D: usize>(x: &mut [Entry<D>], a: f64) {
+    x.iter_mut().flatten().for_each(|x| *x *= a);
+}
+
+/// y ← −x.
+pub(super) fn negate<const D: usize>(x: &[Entry<D>], y: &mut Vec<Entry<D>>) {
+    y.clear();
+    y.extend(x.iter().map(|entry| entry.map(|v| -v)));
+}

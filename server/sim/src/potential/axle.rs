@@ -261,7 +261,7 @@ mod tests {
         let before = world.momentum().angular;
         for tick in 0..30 {
             let report = world.step();
-            assert!(report.residual < 1e-3 && report.newton_iterations <= 5, "tick {tick}: {report:?}");
+            assert!(report.residual < 1e-3 && report.iterations <= 5, "tick {tick}: {report:?}");
         }
         let change = (world.momentum().angular - before).length() / before.length();
         assert!(change < 3e-3, "angular momentum changed by {change}");

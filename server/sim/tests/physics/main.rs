@@ -5,6 +5,7 @@ mod collisions;
 mod determinism;
 mod hostile;
 mod joints;
+mod solvers;
 
 use pita_sim::{BodyId, Collider, DQuat, DVec3, ParticleDesc, RigidBodyDesc, Settings, Shape, StaticDesc, World};
 

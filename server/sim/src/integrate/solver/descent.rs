@@ -1,0 +1,146 @@
+//! What all methods share: guess, ask for a direction, walk along it, until there is a reason to stop.
+
+use super::super::block::Entry;
+use super::super::line_search;
+use super::super::matrix::Matrix;
+use super::super::problem::Problem;
+use super::super::vector::{add_scaled, inner};
+use super::guess::guess;
+use super::work::Work;
+use super::{SolveReport, Solver, Standpoint, StoppedBecause};
+use crate::settings::SolverSettings;
+
+/// A walk that changes no unknown by more than this fraction of the largest goes nowhere: some units of rounding.
+const STANDSTILL: f64 = 1e-15;
+
+/// Passes over vectors in an iteration, besides a method's own: two products for the slope, and the merit.
+const VECTORS_AN_ITERATION: u64 = 3;
+
+/// Passes over vectors in each step of a line search: copy, add, product.
+const VECTORS_A_TRIAL: u64 = 3;
+
+/// The state of a solve, kept from solve to solve for its memory.
+#[derive(Default)]
+pub(super) struct Descent<const D: usize> {
+    u: Vec<Entry<D>>,
+    /// Where the last walk began; scratch of the guess before.
+    start: Vec<Entry<D>>,
+    residual: Vec<Entry<D>>,
+    step: Vec<Entry<D>>,
+    best: Best<D>,
+    matrix: Matrix<D>,
+}
+
+/// The state with the least merit so far.
+#[derive(Default)]
+struct Best<const D: usize> {
+    u: Vec<Entry<D>>,
+    merit: f64,
+    residual: f64,
+}
+
+impl<const D: usize> Descent<D> {
+    /// Moves `problem`'s trial to the end of the tick by the method's directions. `budget` is exceeded by one iteration
+    /// at most, and by what the start takes.
+    pub fn solve(
+        &mut self,
+        method: &mut dyn Solver<D>,
+        problem: &mut Problem,
+        settings: &SolverSettings,
+        budget: Option<u64>,
+    ) -> SolveReport {
+        let mut work = Work::begin::<D>(problem, budget);
+        let mut report = SolveReport::default();
+        guess(problem, settings, &mut work, &mut self.u, &mut self.start, &mut self.residual);
+        self.best.merit = f64::INFINITY;
+        loop {
+            self.relinearise(problem, &mut work, &mut report);
+            if let Some(reason) = self.reason_to_stop(settings, &work, &report) {
+                report.stopped_because = reason;
+                break;
+            }
+            let before = work.multiply_adds();
+            let iteration = report.iterations;
+            let Self { u, residual, matrix, step, .. } = self;
+            let at = Standpoint { problem, u, residual, matrix, settings, work: &mut work, iteration };
+            report.linear_iterations += method.direction(at, step);
+            report.iterations += 1;
+            let moved = self.walk(method, problem, &mut work);
+            work.iteration_took(work.multiply_adds() - before);
+            if !moved {
+                self.relinearise(problem, &mut work, &mut report);
+                report.stopped_because =
+                    self.reason_to_stop(settings, &work, &report).unwrap_or(StoppedBecause::Stagnation);
+                break;
+            }
+        }
+        self.return_to_best(problem, &mut report);
+        SolveReport { evaluations: work.evaluations(), work: work.spent(), ..report }
+    }
+
+    /// Takes anew what is frozen during an iteration, and sees how good the state is.
+    fn relinearise(&mut self, problem: &mut Problem, work: &mut Work, report: &mut SolveReport) {
+        problem.relinearise();
+        work.told_potentials();
+        problem.evaluate(&mut self.residual);
+        work.evaluated();
+        report.residual = problem.residual_speed(&self.residual);
+        report.merit = problem.merit(&self.residual);
+        work.vectors(VECTORS_AN_ITERATION);
+        if report.merit < self.best.merit {
+            self.best.u.clone_from(&self.u);
+            (self.best.merit, self.best.residual) = (report.merit, report.residual);
+        }
+    }
+
+    fn reason_to_stop(&self, settings: &SolverSettings, work: &Work, report: &SolveReport) -> Option<StoppedBecause> {
+        if !report.residual.is_finite() {
+            return Some(StoppedBecause::NonFinite);
+        }
+        if report.residual <= settings.tolerance {
+            return Some(StoppedBecause::Tolerance);
+        }
+        if report.iterations >= settings.iterations() {
+            return Some(StoppedBecause::IterationLimit);
+        }
+        (!work.affords_iteration()).then_some(StoppedBecause::Budget)
+    }
+
+    /// Walks along the step; leaves `u` and the trial where it ends. Answers whether that is elsewhere.
+    fn walk(&mut self, method: &mut dyn Solver<D>, problem: &mut Problem, work: &mut Work) -> bool {
+        let Self { u, start, residual, step, .. } = self;
+        let slope = inner(residual, step);
+        let descends = slope < 0.0;
+        if !descends {
+            return false;
+        }
+        problem.propose(step);
+        work.told_potentials();
+        start.clone_from(u);
+        let alpha = line_search::search(slope, method.walk(), |alpha| {
+            u.clone_from(start);
+            add_scaled(u, alpha, step);
+            problem.move_to(u);
+            problem.evaluate(residual);
+            work.moved_and_evaluated();
+            work.vectors(VECTORS_A_TRIAL);
+            inner(residual, step)
+        });
+        method.walked(alpha, step, residual);
+        let largest = u.as_flattened().iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+        u.as_flattened().iter().zip(start.as_flattened()).any(|(now, before)| {
+            let still = (now - before).abs() <= STANDSTILL * largest;
+            !still
+        })
+    }
+
+    /// One body's overflow must not spread over its island, nor a last step that went wrong.
+    fn return_to_best(&mut self, problem: &mut Problem, report: &mut SolveReport) {
+        let Best { u, merit, residual } = &self.best;
+        let is_at_best = report.stopped_because == StoppedBecause::Tolerance || report.merit <= *merit;
+        if !is_at_best && merit.is_finite() {
+            problem.move_to(u);
+            (report.merit, report.residual) = (*merit, *residual);
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! Discrete Newton (talk, "Discrete Newton": "finite differences to approximate the Hessian", for those who cannot
+//! build it).
+//!
+//! Exactly: forward differences of the residual in the pattern of the Hessian. Bodies that share no neighbour are moved
+//! together (Curtis, Powell and Reid, 1974), so that an evaluation serves a column of each; what comes twice, once from
+//! either side of the diagonal, is averaged. The Newton system is then solved as by [`newton`](super::newton).
+
+use super::super::block::{Block, Entry, zero};
+use super::super::matrix::Matrix;
+use super::super::problem::Problem;
+use super::newton::Newton;
+use super::{Solver, Standpoint};
+use crate::integrate::solver::work::Work;
+
+/// By how much an unknown is moved, m/s and rad/s: a displacement of 3e-8 m in a tick, small against the millimetre over
+/// which contacts change, and large against the rounding of positions.
+const DIFFERENCE: f64 = 1e-6;
+
+/// The method's memory.
+#[derive(Default)]
+pub(super) struct DiscreteNewton<const D: usize> {
+    colours: Colouring,
+    moved: Vec<Entry<D>>,
+    changed: Vec<Entry<D>>,
+    newton: Newton<D>,
+}
+
+/// A colour for each body, such that bodies of one colour neither are neighbours nor have one in common.
+#[derive(Default)]
+struct Colouring {
+    /// `neighbours[starts[i]..starts[i + 1]]`: of body i, with the place of their block below the diagonal.
+    starts: Vec<u32>,
+    neighbours: Vec<(u32, u32)>,
+    colour: Vec<u32>,
+    /// The last body that must not have a colour.
+    forbidden_for: Vec<u32>,
+    colours: u32,
+}
+
+/// Neither a body nor a colour.
+const NONE: u32 = u32::MAX;
+
+impl Colouring {
+    /// Greedy, in elimination order.
+    fn find<const D: usize>(&mut self, a: &Matrix<D>) {
+        self.list_neighbours(a);
+        let n = a.diagonal.len();
+        self.colour.clear();
+        self.colour.resize(n, NONE);
+        self.forbidden_for.clear();
+        self.forbidden_for.resize(n, NONE);
+        self.colours = 0;
+        for i in 0..n {
+            for &(j, _) in &self.neighbours[span(&self.starts, i)] {
+                forbid(&mut self.forbidden_for, self.colour[j as usize], i);
+                for &(k, _) in &self.neighbours[span(&self.starts, j as usize)] {
+                    forbid(&mut self.forbidden_for, self.colour[k as usize], i);
+                }
+            }
+            let free = self.forbidden_for.iter().position(|&body| body != i as u32);
+            self.colour[i] = free.map_or(NONE, |colour| colour as u32);
+            self.colours = self.colours.max(self.colour[i] + 1);
+        }
+    }
+
+    fn list_neighbours<const D: usize>(&mut self, a: &Matrix<D>) {
+        let n = a.diagonal.len();
+        self.starts.clear();
+        self.starts.resize(n + 1, 0);
+        for i in 0..n {
+            for k in a.row(i) {
+                self.starts[i + 1] += 1;
+                self.starts[a.columns[k] as usize + 1] += 1;
+            }
+        }
+        for i in 0..n {
+            self.starts[i + 1] += self.starts[i];
+        }
+        self.neighbours.clear();
+        self.neighbours.resize(2 * a.columns.len(), (NONE, NONE));
+        // The next free place of each body's share; the colours' memory serves until they are found.
+        let next = &mut self.colour;
+        next.clear();
+        next.extend_from_slice(&self.starts[..n]);
+        for i in 0..n {
+            for k in a.row(i) {
+                let j = a.columns[k] as usize;
+                for (from, to) in [(i, j), (j, i)] {
+                    self.neighbours[next[from] as usize] = (to as u32, k as u32);
+                    next[from] += 1;
+                }
+            }
+        }
+    }
+}
+
+fn span(starts: &[u32], i: usize) -> std::ops::Range<usize> {
+    starts[i] as usize..starts[i + 1] as usize
+}
+
+fn forbid(forbidden_for: &mut [u32], colour: u32, body: usize) {
+    if let Some(last) = forbidden_for.get_mut(colour as usize) {
+        *last = body as u32;
+    }
+}
+
+impl<const D: usize> DiscreteNewton<D> {
+    /// Fills `a` by differences of the residual about `u`, where it is `residual`. Leaves the trial at `u`.
+    fn difference(
+        &mut self,
+        problem: &mut Problem,
+        u: &[Entry<D>],
+        residual: &[Entry<D>],
+        work: &mut Work,
+        a: &mut Matrix<D>,
+    ) {
+        a.diagonal.fill(zero());
+        a.lower.fill(zero());
+        for colour in 0..self.colours.colours {
+            for axis in 0..D {
+                self.moved.clear();
+                self.moved.extend_from_slice(u);
+                for (entry, _) in self.moved.iter_mut().zip(&self.colours.colour).filter(|(_, c)| **c == colour) {
+                    entry[axis] += DIFFERENCE;
+                }
+                problem.move_to(&self.moved);
+                problem.evaluate(&mut self.changed);
+                work.moved_and_evaluated();
+                work.vectors(3);
+                for i in (0..u.len()).filter(|&i| self.colours.colour[i] == colour) {
+                    self.add_column(i, axis, self.moved[i][axis] - u[i][axis], residual, a);
+                }
+            }
+        }
+        problem.move_to(u);
+        work.moved();
+    }
+
+    /// Adds the column of body i's unknown `axis`, which was moved by `h`: half of it, as the other half comes from the
+    /// rows.
+    fn add_column(&self, i: usize, axis: usize, h: f64, residual: &[Entry<D>], a: &mut Matrix<D>) {
+        let derivative = |j: usize, row: usize| (self.changed[j][row] - residual[j][row]) / (2.0 * h);
+        for row in 0..D {
+            a.diagonal[i][row][axis] += derivative(i, row);
+            a.diagonal[i][axis][row] += derivative(i, row);
+        }
+        for &(j, place) in &self.colours.neighbours[span(&self.colours.starts, i)] {
+            let block: &mut Block<D> = &mut a.lower[place as usize];
+            for row in 0..D {
+                let (p, q) = if j as usize > i { (row, axis) } else { (axis, row) };
+                block[p][q] += derivative(j as usize, row);
+            }
+        }
+    }
+}
+
+impl<const D: usize> Solver<D> for DiscreteNewton<D> {
+    fn direction(&mut self, at: Standpoint<D>, step: &mut Vec<Entry<D>>) -> usize {
+        if at.iteration == 0 {
+            at.matrix.analyse(at.problem);
+            self.colours.find(at.matrix);
+            self.newton.analyse(at.matrix);
+        }
+        self.difference(at.problem, at.u, at.residual, at.work, at.matrix);
+        self.newton.solve(at, step)
+    }
+}

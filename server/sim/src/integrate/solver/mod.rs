@@ -1,0 +1,141 @@
+//! Solvers: how an island's residual is made zero. One file a method, named as in the talk.
+//!
+//! Every method is a [`Solver`]: it says where to go. `descent` does what they share: the starting guess (`guess`), the
+//! line search, the stop, the best state so far, and the [`SolveReport`]; it counts `work`. The settings choose the
+//! `method`; `auto` chooses by itself. Nothing here knows a potential or a DOF kind.
+
+mod auto;
+mod descent;
+mod discrete_newton;
+mod gauss_seidel;
+mod guess;
+mod jacobi;
+pub(super) mod method;
+mod newton;
+mod nonlinear_conjugate_gradient;
+mod quasi_newton;
+mod sor;
+mod steepest_descent;
+mod step_length;
+mod truncated_newton;
+pub(super) mod work;
+
+use self::descent::Descent;
+use self::method::Method;
+use self::work::Work;
+use super::block::Entry;
+use super::line_search::Walk;
+use super::matrix::Matrix;
+use super::problem::Problem;
+use crate::settings::SolverSettings;
+
+/// A method: from where it stands, where to go.
+pub(super) trait Solver<const D: usize> {
+    /// Writes a direction of descent, a change of the unknowns, to `step`. Answers the iterations of a linear solver
+    /// that this took. The first call of a solve has [`Standpoint::iteration`] 0: nothing holds from before.
+    fn direction(&mut self, at: Standpoint<D>, step: &mut Vec<Entry<D>>) -> usize;
+
+    /// Hears how far the line search went, in steps, and of the residual there, before anything is taken anew.
+    fn walked(&mut self, _alpha: f64, _step: &[Entry<D>], _residual: &[Entry<D>]) {}
+
+    /// How the line search walks.
+    fn walk(&self) -> Walk {
+        Walk::NEWTON
+    }
+}
+
+/// Where a method stands when it is asked for a direction.
+pub(super) struct Standpoint<'a, const D: usize> {
+    /// Its trial is at `u`, and what is frozen during an iteration is taken from there.
+    pub problem: &'a mut Problem,
+    /// The unknowns.
+    pub u: &'a [Entry<D>],
+    /// The residual at `u`.
+    pub residual: &'a [Entry<D>],
+    /// For the Hessian, where the method wants it.
+    pub matrix: &'a mut Matrix<D>,
+    pub settings: &'a SolverSettings,
+    pub work: &'a mut Work,
+    /// Directions that were asked for before in this solve.
+    pub iteration: usize,
+}
+
+impl<const D: usize> Standpoint<'_, D> {
+    /// Assembles the Hessian in `matrix`; finds its pattern first where this is a solve's first iteration.
+    pub fn assemble(&mut self) {
+        if self.iteration == 0 {
+            self.matrix.analyse(self.problem);
+        }
+        self.matrix.assemble(self.problem);
+        self.work.assembled();
+    }
+}
+
+/// Why a solver stopped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StoppedBecause {
+    /// The residual of every body is within the tolerance.
+    #[default]
+    Tolerance,
+    /// The limit of iterations was reached.
+    IterationLimit,
+    /// The work that it was given was used up.
+    Budget,
+    /// Steps change nothing any more, or there is no direction of descent.
+    Stagnation,
+    /// The residual overflowed.
+    NonFinite,
+}
+
+/// What solving an island took, and where it ended. Unless it stopped because of the tolerance, it ended at the state with
+/// the least merit that it saw.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct SolveReport {
+    pub iterations: usize,
+    /// Iterations of a linear solver.
+    pub linear_iterations: usize,
+    /// Evaluations of the residual.
+    pub evaluations: usize,
+    /// Block operations, see [`work`].
+    pub work: u64,
+    /// Largest residual of a body at the end, m/s.
+    pub residual: f64,
+    /// ½ RᵀM⁻¹R at the end: the kinetic energy of the momentum that is missing, J.
+    pub merit: f64,
+    pub stopped_because: StoppedBecause,
+}
+
+/// All methods with their memory; those that are not in use are empty. D is 3 where no body of the island rotates, else 6.
+#[derive(Default)]
+pub(crate) struct Solvers<const D: usize> {
+    descent: Descent<D>,
+    auto: auto::Auto<D>,
+    jacobi: jacobi::Jacobi<D>,
+    gauss_seidel: gauss_seidel::GaussSeidel<D>,
+    sor: sor::Sor<D>,
+    steepest_descent: steepest_descent::SteepestDescent<D>,
+    nonlinear_conjugate_gradient: nonlinear_conjugate_gradient::NonlinearConjugateGradient<D>,
+    newton: newton::Newton<D>,
+    discrete_newton: discrete_newton::DiscreteNewton<D>,
+    quasi_newton: quasi_newton::QuasiNewton<D>,
+    truncated_newton: truncated_newton::TruncatedNewton<D>,
+}
+
+impl<const D: usize> Solvers<D> {
+    /// Moves `problem`'s trial to the end of the tick, within `budget` block operations.
+    pub fn solve(&mut self, problem: &mut Problem, settings: &SolverSettings, budget: Option<u64>) -> SolveReport {
+        let method: &mut dyn Solver<D> = match settings.method {
+            Method::Auto => &mut self.auto,
+            Method::Jacobi => &mut self.jacobi,
+            Method::GaussSeidel => &mut self.gauss_seidel,
+            Method::Sor => &mut self.sor,
+            Method::SteepestDescent => &mut self.steepest_descent,
+            Method::NonlinearConjugateGradient => &mut self.nonlinear_conjugate_gradient,
+            Method::Newton => &mut self.newton,
+            Method::DiscreteNewton => &mut self.discrete_newton,
+            Method::QuasiNewton => &mut self.quasi_newton,
+            Method::TruncatedNewton => &mut self.truncated_newton,
+        };
+        self.descent.solve(method, problem, settings, budget)
+    }
+}

@@ -1,0 +1,70 @@
+//! Every method through the world: same ends, honest reports.
+
+use pita_sim::{Anchor, DVec3, Method, Settings, SolverSettings, SpringDesc, World};
+
+use super::{DT, cube, ground, particle};
+
+fn world_with(solver: SolverSettings) -> World {
+    World::new(Settings { solver, ..Settings::at(DT) }).unwrap()
+}
+
+/// A square net of springs that hangs from two corners.
+fn net(solver: SolverSettings) -> World {
+    const SIDE: usize = 4;
+    let mut world = world_with(solver);
+    let at = |i: usize| DVec3::new((i % SIDE) as f64, (i / SIDE) as f64, 0.0) * 0.5;
+    let knots: Vec<_> = (0..SIDE * SIDE).map(|i| particle(&mut world, at(i), DVec3::Z * 0.1 * i as f64, 0.5)).collect();
+    let mut spring = |a: Anchor, b: Anchor, rest_length: f64| {
+        world.add_spring(SpringDesc { a, b, rest_length, stiffness: 200.0, damping: 1.0 }).unwrap();
+    };
+    for i in 0..SIDE * SIDE {
+        let here = Anchor::body(knots[i], DVec3::ZERO);
+        if i % SIDE + 1 < SIDE {
+            spring(here, Anchor::body(knots[i + 1], DVec3::ZERO), 0.45);
+        }
+        if i + SIDE < SIDE * SIDE {
+            spring(here, Anchor::body(knots[i + SIDE], DVec3::ZERO), 0.45);
+        }
+    }
+    for corner in [SIDE * (SIDE - 1), SIDE * SIDE - 1] {
+        spring(Anchor::world(at(corner) + DVec3::Y * 0.5), Anchor::body(knots[corner], DVec3::ZERO), 0.4);
+    }
+    world
+}
+
+/// A box that settles on the ground.
+fn resting_box(solver: SolverSettings) -> World {
+    let mut world = world_with(solver);
+    ground(&mut world);
+    cube(&mut world, DVec3::new(0.0, 0.501, 0.0));
+    world
+}
+
+fn state(world: &World) -> Vec<f64> {
+    world.slices().flat_map(|slice| slice.q.to_vec()).collect()
+}
+
+#[test]
+fn every_method_comes_to_the_same_end() {
+    for (name, scene, ticks) in [("net", net as fn(_) -> _, 30), ("box", resting_box, 30)] {
+        let run = |method: Method| {
+            let mut world = scene(SolverSettings { method, tolerance: 1e-7, ..SolverSettings::default() });
+            for tick in 0..ticks {
+                let report = world.step();
+                assert_eq!(report.unconverged_islands, 0, "{name}, {method}, tick {tick}: {report:?}");
+                assert!(report.residual <= 1e-7 && report.work > 0, "{name}, {method}: {report:?}");
+            }
+            state(&world)
+        };
+        let expected = run(Method::Newton);
+        for (_, method) in Method::ALL {
+            let difference = state_difference(&run(method), &expected);
+            assert!(difference < 1e-4, "{name}: {method} ends {difference} m from newton");
+        }
+    }
+}
+
+fn state_difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
