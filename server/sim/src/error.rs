@@ -35,6 +35,21 @@ pub enum SimError {
         /// Why not.
         what: &'static str,
     },
+    /// One of several items is refused.
+    #[error("{item}: {reason}")]
+    Named {
+        /// Which one, such as `part 2 (head)`.
+        item: String,
+        /// Why.
+        reason: Box<SimError>,
+    },
+}
+
+impl SimError {
+    /// The same, said of `item`.
+    pub(crate) fn of(self, item: impl Into<String>) -> Self {
+        Self::Named { item: item.into(), reason: Box::new(self) }
+    }
 }
 
 /// `Err` unless `value` is finite and `ok`.

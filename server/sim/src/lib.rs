@@ -30,6 +30,7 @@ mod state;
 mod world;
 
 pub use collide::{Collider, ContactView, Shape, StaticDesc, StaticId};
+pub use dof::articulated::{Articulated, JointDesc, JointKind, PartDesc};
 pub use dof::{BodyId, Dof, DofKind, FigureDesc, Frame, PartCollider, PartPoint, ParticleDesc, RigidBodyDesc};
 pub use error::SimError;
 pub use glam::{DMat3, DQuat, DVec3};

@@ -460,6 +460,7 @@ impl World {
         for (numbers, what) in [(q, "q"), (v, "v")] {
             numbers.iter().try_for_each(|&x| require(x.abs() < 1e9, what, x, "finite and below 1e9"))?;
         }
+        figure.dof.check(q, v)?;
         figure.change.fill(0.0);
         body.quarantined = false;
         self.state.q_mut(body.slice).copy_from_slice(q);

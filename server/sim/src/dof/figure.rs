@@ -66,6 +66,7 @@ impl FigureDesc {
         for (numbers, what) in [(&self.q, "q"), (&self.v, "v")] {
             numbers.iter().try_for_each(|&x| require(x.abs() < LARGEST, what, x, "finite and below 1e9"))?;
         }
+        self.dof.check(&self.q, &self.v)?;
         if let Inertia::Points(masses) = self.dof.inertia() {
             let points =
                 blocks.iter().all(|b| (b.positions, b.rates) == (3, 3)) && masses.diagonal.len() == blocks.len();

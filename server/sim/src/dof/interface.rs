@@ -8,6 +8,7 @@
 use glam::{DMat3, DVec3};
 
 use super::Frame;
+use crate::error::SimError;
 
 /// Most rates of a block.
 pub const BLOCK_RATES_MAX: usize = 6;
@@ -95,6 +96,14 @@ pub struct LocalState<'a> {
 pub trait Dof: Send + Sync {
     /// What people call the kind.
     fn kind(&self) -> super::DofKind;
+
+    /// What is wrong with a state, beyond numbers that are not finite or too many.
+    ///
+    /// # Errors
+    /// [`SimError`] naming the item.
+    fn check(&self, _q: &[f64], _v: &[f64]) -> Result<(), SimError> {
+        Ok(())
+    }
 
     // --- Kinematics
 

@@ -3,6 +3,7 @@
 //! A kind is Kinematics (how the slice moves over a tick), Inertia (its mass as the integrator sees it) and Potentials
 //! (what pushes it; those live in [`potential`](crate::potential)). One file a kind.
 
+pub mod articulated;
 mod figure;
 mod frame;
 mod interface;

@@ -1,0 +1,180 @@
+//! Kinematics against finite differences; what is refused.
+
+use glam::{DMat3, DQuat, DVec3};
+use proptest::prelude::*;
+
+use super::*;
+use crate::mass::{Density, MassProperties};
+use crate::{BodyId, FigureDesc, Settings, Shape, World};
+
+fn solid() -> MassProperties {
+    Shape::Box { half: DVec3::new(0.1, 0.2, 0.3) }.mass_properties(Density::constant(100.0)).unwrap()
+}
+
+fn part(name: &str, parent: Option<u32>, joint: JointDesc) -> PartDesc {
+    PartDesc { name: name.into(), mass: solid(), parent, joint }
+}
+
+fn vector() -> impl Strategy<Value = DVec3> {
+    prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from_array)
+}
+
+fn kind() -> impl Strategy<Value = JointKind> {
+    let axis = || vector().prop_filter("an axis", |a| a.length() > 0.1);
+    prop_oneof![
+        Just(JointKind::Fixed),
+        Just(JointKind::Ball),
+        Just(JointKind::Free),
+        axis().prop_map(|axis| JointKind::Hinge { axis }),
+        axis().prop_map(|axis| JointKind::Slider { axis }),
+        axis().prop_map(|a| JointKind::Universal { axes: [a, a.any_orthogonal_vector() + a] }),
+    ]
+}
+
+/// A tree of six parts of which something moves.
+fn figure() -> impl Strategy<Value = Articulated> {
+    let joint = (kind(), vector(), vector(), vector()).prop_map(|(kind, in_parent, in_part, turn)| JointDesc {
+        kind,
+        in_parent,
+        in_part,
+        rest: DQuat::from_scaled_axis(turn * 2.0),
+    });
+    let parts = prop::collection::vec((joint, any::<prop::sample::Index>(), 0..6u8), 6);
+    parts.prop_filter_map("nothing moves", |parts| {
+        let part = |(i, (joint, parent, root)): (usize, (JointDesc, prop::sample::Index, u8))| {
+            let parent = (i > 0 && root > 0).then(|| parent.index(i.max(1)) as u32);
+            part(&format!("p{i}"), parent, joint)
+        };
+        Articulated::new(parts.into_iter().enumerate().map(part).collect()).ok()
+    })
+}
+
+/// A state from as many numbers as are needed, by a step from rest.
+fn state(figure: &Articulated, numbers: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let mut numbers = numbers.iter().copied().cycle();
+    let mut draw = || figure.still().iter().map(|_| numbers.next().unwrap()).collect::<Vec<_>>();
+    let (moved, v) = (draw(), draw());
+    let mut q = figure.rest();
+    figure.step(&figure.rest(), &moved, 1.0, &mut q);
+    (q, v)
+}
+
+/// Twist from `a` to `b` over `dt`, to second order where `a` and `b` lie on either side of the middle.
+fn difference(a: &Frame<f64>, b: &Frame<f64>, dt: f64) -> [DVec3; 2] {
+    let linear = (DVec3::from(b.position) - DVec3::from(a.position)) / dt;
+    let turn: DMat3 = b.rotation.value() * a.rotation.value().transpose();
+    [linear, DQuat::from_mat3(&turn).to_scaled_axis() / dt]
+}
+
+proptest! {
+    /// The frame's twist, as written, is that of central differences along the step, and J v.
+    #[test]
+    fn frames_move_as_they_say(
+        figure in figure(), numbers in prop::collection::vec(-2.0..2.0f64, 37), point in vector(), part in 0..6u32,
+    ) {
+        let (q, v) = state(&figure, &numbers);
+        let at = PartPoint { part, point };
+        let frame = figure.frame(at, &q, &v);
+        let h = 1e-5;
+        let [before, after] = [-h, h].map(|h| {
+            let mut moved = q.clone();
+            figure.step(&q, &v, h, &mut moved);
+            figure.frame(at, &moved, &v)
+        });
+        let by_difference = difference(&before, &after, 2.0 * h);
+        let mut by_columns = [DVec3::ZERO; 2];
+        let starts: Vec<usize> =
+            figure.blocks.iter().scan(0, |sum, b| Some(std::mem::replace(sum, *sum + usize::from(b.rates)))).collect();
+        figure.jacobian(at, &q, &mut |block, columns| {
+            let rates = v[starts[block]..].iter().take(usize::from(figure.blocks[block].rates));
+            for (column, rate) in columns.iter().zip(rates) {
+                by_columns[0] += DVec3::from_slice(column) * *rate;
+                by_columns[1] += DVec3::from_slice(&column[3..]) * *rate;
+            }
+        });
+        for (i, written) in [frame.linear, frame.angular].into_iter().map(DVec3::from).enumerate() {
+            prop_assert!((by_columns[i] - written).length() < 1e-9, "{} {written}", by_columns[i]);
+            prop_assert!((by_difference[i] - written).length() < 1e-5 * (1.0 + written.length()), "{by_difference:?} {written}");
+        }
+    }
+
+    /// What a joint does not leave stays as it was: the two points of it meet, and axes keep to each other.
+    #[test]
+    fn joints_hold(figure in figure(), numbers in prop::collection::vec(-2.0..2.0f64, 37)) {
+        let (q, v) = state(&figure, &numbers);
+        for (index, PartDesc { parent, joint, .. }) in (0u32..).zip(figure.descriptions()) {
+            let frame = |part: Option<u32>, point| {
+                part.map_or(Frame::point(point, DVec3::ZERO), |part| figure.frame(PartPoint { part, point }, &q, &v))
+            };
+            let (base, carried) = (frame(*parent, joint.in_parent), frame(Some(index), joint.in_part));
+            let gap = DVec3::from(carried.position) - DVec3::from(base.position);
+            let turn = |v: DVec3| DVec3::from(base.arm(v));
+            let turned = |v: DVec3| DVec3::from(carried.arm(joint.rest.inverse() * v));
+            match joint.kind {
+                JointKind::Fixed => prop_assert!((turn(DVec3::ONE) - turned(DVec3::ONE)).length() < 1e-9),
+                JointKind::Hinge { axis } => prop_assert!((turn(axis) - turned(axis)).length() < 1e-9),
+                JointKind::Universal { axes: [a, b] } => {
+                    prop_assert!((turn(a).dot(turned(b)) - a.dot(b)).abs() < 1e-9);
+                }
+                JointKind::Slider { axis } => {
+                    prop_assert!(gap.cross(turn(axis)).length() < 1e-9);
+                    prop_assert!((turn(DVec3::ONE) - turned(DVec3::ONE)).length() < 1e-9);
+                }
+                JointKind::Ball | JointKind::Free => {}
+            }
+            if !matches!(joint.kind, JointKind::Slider { .. } | JointKind::Free) {
+                prop_assert!(gap.length() < 1e-9, "{gap}");
+            }
+        }
+    }
+}
+
+fn refusal(parts: Vec<PartDesc>) -> String {
+    Articulated::new(parts).unwrap_err().to_string()
+}
+
+#[test]
+fn what_is_wrong_is_named() {
+    let free = || part("body", None, JointDesc::new(JointKind::Free));
+    let hinge = |axis| JointDesc::new(JointKind::Hinge { axis });
+    let leg = |parent, joint| vec![free(), part("left leg", parent, joint)];
+    assert_eq!(refusal(vec![]), "number of parts is 0, allowed is 1 to 256");
+    assert_eq!(
+        refusal(leg(Some(1), hinge(DVec3::X))),
+        "part 1 (left leg): parent is 1, allowed is the index of an earlier part"
+    );
+    assert_eq!(refusal(leg(Some(0), hinge(DVec3::ZERO))), "part 1 (left leg): the joint's axis is zero");
+    assert!(refusal(leg(Some(0), hinge(DVec3::NAN))).contains("part 1 (left leg): axis of the joint is NaN"));
+    let parallel = JointDesc::new(JointKind::Universal { axes: [DVec3::X, -DVec3::X] });
+    assert!(refusal(leg(Some(0), parallel)).contains("sine of the angle between the axes"));
+    let mut massless = leg(Some(0), hinge(DVec3::X));
+    massless[1].mass.mass = 0.0;
+    assert!(refusal(massless).contains("part 1 (left leg): mass is 0"));
+    let mut point = leg(Some(0), hinge(DVec3::X));
+    point[1].mass = MassProperties::of_point(1.0, DVec3::X).unwrap();
+    assert!(refusal(point).contains("part 1 (left leg): smallest moment of inertia"));
+    let far = hinge(DVec3::X).at(DVec3::X * f64::INFINITY, DVec3::ZERO);
+    assert!(refusal(leg(Some(0), far)).contains("part 1 (left leg): the joint's point in the parent"));
+    assert!(
+        refusal(vec![part("wall", None, JointDesc::new(JointKind::Fixed))]).contains("nothing of the figure can move")
+    );
+}
+
+fn add(world: &mut World, figure: &Articulated, q: Vec<f64>) -> Result<BodyId, SimError> {
+    let (dof, v) = (std::sync::Arc::new(figure.clone()), figure.still());
+    world.add_figure(FigureDesc { dof, q, v, colliders: Vec::new() })
+}
+
+#[test]
+fn states_that_are_none_are_refused() {
+    let figure = Articulated::new(vec![part("body", None, JointDesc::new(JointKind::Free))]).unwrap();
+    let mut world = World::new(Settings::at(1.0 / 30.0)).unwrap();
+    let mut q = figure.rest();
+    q[6] = 0.0;
+    let error = add(&mut world, &figure, q.clone()).unwrap_err().to_string();
+    assert_eq!(error, "part 0 (body): rotation at the joint is 0, allowed is a quaternion of length 1");
+    assert!(add(&mut world, &figure, vec![0.0; 6]).is_err());
+    let id = add(&mut world, &figure, figure.rest()).unwrap();
+    assert!(world.set_slice(id, &q, &figure.still()).is_err());
+    assert!(world.set_slice(id, &figure.rest(), &figure.still()).is_ok());
+}
