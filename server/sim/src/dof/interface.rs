@@ -37,6 +37,15 @@ pub struct PartPoint {
     pub point: DVec3,
 }
 
+/// What pulls at a material point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PartLoad {
+    /// Where.
+    pub at: PartPoint,
+    /// Minus the impulse of the tick, N s.
+    pub impulse: DVec3,
+}
+
 /// Inertia of a kind: the relation between forces and accelerations.
 #[derive(Clone, Copy, Debug)]
 pub enum Inertia<'a> {
@@ -130,6 +139,19 @@ pub trait Dof: Send + Sync {
 
     /// Its inertia.
     fn inertia(&self) -> Inertia<'_>;
+
+    /// For [`Inertia::Parts`]: hands `add` the positive semidefinite part of the second derivative of Σ impulse · x over
+    /// `loads`, with respect to turns of parts, N m s. The impulses are what the figure's own rigidity hands on; without
+    /// this Newton fails where light parts carry heavy ones. The first loads are the parts' centres of mass, one a part,
+    /// with the parts' rotations in `centres`; all may be overwritten.
+    fn geometric_stiffness(
+        &self,
+        _q1: &[f64],
+        _centres: &[Frame<f64>],
+        _loads: &mut [PartLoad],
+        _add: &mut dyn FnMut(usize, DMat3),
+    ) {
+    }
 
     // --- Potentials
 

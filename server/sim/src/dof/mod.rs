@@ -16,8 +16,8 @@ pub(crate) use figure::FigureBody;
 pub use figure::{FigureDesc, PartCollider};
 pub use frame::Frame;
 pub use interface::{
-    BLOCK_RATES_MAX, BlockSize, Columns, Dof, Inertia, LocalState, PartInertia, PartPoint, PointMasses, PointRod,
-    RateBlock,
+    BLOCK_RATES_MAX, BlockSize, Columns, Dof, Inertia, LocalState, PartInertia, PartLoad, PartPoint, PointMasses,
+    PointRod, RateBlock,
 };
 
 use crate::collide::Collider;

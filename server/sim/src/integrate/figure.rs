@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::block::{Block, Entry};
-use crate::dof::{Columns, Dof, Frame, Inertia, LocalState, PartPoint, Twist};
+use crate::dof::{Columns, Dof, Frame, Inertia, LocalState, PartLoad, PartPoint, Twist};
 use crate::potential::Wrench;
 
 /// A body of a general kind in an island.
@@ -26,6 +26,9 @@ pub(crate) struct Figure {
     parts: Range<u32>,
     /// Momentum that each part would have at the end of the tick without potentials.
     free_momenta: Vec<Wrench>,
+    loads: Vec<PartLoad>,
+    /// Stiffness of each part against turns that comes from its loads, N m s.
+    geometric: Vec<DMat3>,
 }
 
 /// A material point of a figure at which something acts: one more frame of the island.
@@ -177,15 +180,19 @@ impl Figures {
 
     /// Hands `add` the blocks of the figures' inertia and of their own potentials: (row, column, entries), rows not
     /// above columns.
-    pub fn assemble(&self, dt: f64, frames: &[Frame<f64>], add: &mut impl FnMut(u32, u32, &Block<6>)) {
+    pub fn assemble(&mut self, dt: f64, frames: &[Frame<f64>], add: &mut impl FnMut(u32, u32, &Block<6>)) {
+        let attached = &frames[frames.len() - self.attachments.len()..];
+        for (index, figure) in (0..).zip(&mut self.list[..self.used]) {
+            figure.load(index, &self.attachments, &self.wrenches, attached);
+        }
         for figure in self.list() {
             match figure.dof.inertia() {
                 Inertia::Points(masses) => figure.assemble_points(masses, add),
                 Inertia::Parts(parts) => {
-                    for (k, part) in (figure.parts.start as usize..).zip(parts) {
-                        let frame = &frames[frames.len() - self.attachments.len() + k];
-                        let inertia = world_inertia(frame, part.inertia);
-                        self.assemble_part(k, part.mass, inertia, add);
+                    let all = (figure.parts.start as usize..).zip(parts).zip(&figure.geometric);
+                    for ((k, part), &geometric) in all {
+                        let turning = world_inertia(&attached[k], part.inertia) + geometric * dt;
+                        self.assemble_part(k, part.mass, turning, add);
                     }
                 }
             }
@@ -238,6 +245,8 @@ impl Figure {
             gradient: Vec::new(),
             parts: 0..0,
             free_momenta: Vec::new(),
+            loads: Vec::new(),
+            geometric: Vec::new(),
         }
     }
 
@@ -356,6 +365,18 @@ impl Figure {
             energy += m * a.dot(b);
         }
         energy
+    }
+
+    /// Finds the geometric stiffness of what pulls at the candidate. Where derivatives are frozen there is none.
+    fn load(&mut self, index: u32, attachments: &[Attachment], wrenches: &[Wrench], attached: &[Frame<f64>]) {
+        let Self { dof, loads, geometric, parts, q1, .. } = self;
+        loads.clear();
+        geometric.clear();
+        geometric.resize(parts.len(), DMat3::ZERO);
+        let mine = attachments.iter().zip(wrenches).filter(|(a, _)| a.figure == index && !a.frozen);
+        loads.extend(mine.map(|(attachment, wrench)| PartLoad { at: attachment.at, impulse: wrench.force.into() }));
+        let centres = &attached[parts.start as usize..parts.end as usize];
+        dof.geometric_stiffness(q1, centres, loads, &mut |part, stiffness| geometric[part] += stiffness);
     }
 
     fn assemble_points(&self, masses: &crate::dof::PointMasses, add: &mut impl FnMut(u32, u32, &Block<6>)) {

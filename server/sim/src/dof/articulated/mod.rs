@@ -20,14 +20,15 @@ mod joint;
 #[cfg(test)]
 mod tests;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 pub use desc::{JointDesc, PARTS_MAX, PartDesc};
 pub use joint::JointKind;
 
-use super::interface::{BlockSize, Columns, Dof, Inertia, PartInertia, PartPoint};
+use super::interface::{BlockSize, Columns, Dof, Inertia, PartInertia, PartLoad, PartPoint};
 use super::{DofKind, Frame, Twist};
 use crate::error::{SimError, require, require_rotation};
+use crate::potential::geometric_stiffness;
 use joint::{Joint, Place};
 
 /// An articulated figure: a tree of parts, each carried by one joint.
@@ -189,5 +190,34 @@ impl Dof for Articulated {
 
     fn inertia(&self) -> Inertia<'_> {
         Inertia::Parts(&self.inertias)
+    }
+
+    /// A point of a part is a sum of vectors, each fixed in a part on the way to it. So the sum over loads is one over
+    /// parts: from a part's own joint to its loads, and to every joint that it carries, which hands on all that hangs
+    /// there.
+    fn geometric_stiffness(
+        &self,
+        q1: &[f64],
+        centres: &[Frame<f64>],
+        loads: &mut [PartLoad],
+        add: &mut dyn FnMut(usize, DMat3),
+    ) {
+        let mut stiffen = |part: usize, impulse: DVec3, end: DVec3| {
+            let arm = centres[part].arm(end - self.joints[part].in_part);
+            add(part, geometric_stiffness(impulse, arm.into()));
+        };
+        for load in &*loads {
+            stiffen(load.at.part as usize, load.impulse, load.at.point);
+        }
+        let (at_centres, others) = loads.split_at_mut(self.parts.len());
+        for load in others {
+            at_centres[load.at.part as usize].impulse += load.impulse;
+        }
+        for (index, joint) in self.joints.iter().enumerate().rev() {
+            let Some(parent) = joint.parent.map(|parent| parent as usize) else { continue };
+            let handed_on = at_centres[index].impulse;
+            stiffen(parent, handed_on, joint.arm(q1));
+            at_centres[parent].impulse += handed_on;
+        }
     }
 }
