@@ -7,7 +7,7 @@ use pita_sim::{
     Articulated, BodyId, DVec3, FigureDesc, JointDesc, JointKind, PartDesc, PartPoint, Settings, Shape, World,
 };
 
-use super::{DT, weightless, world};
+use super::{DT, world};
 
 const G: f64 = 9.81;
 

@@ -9,7 +9,7 @@
 //! the tick, R = Σ J1ᵀ [P(Q1, Q1') − P(Q0, Q0') − W dt]. Linear momentum is exact to the solver's tolerance. Angular
 //! momentum is not: what goes round a joint keeps of its velocity the part that is along its new direction. Turning by
 //! θ a tick about a joint, an off-axis mass turns by θ' = θ cos θ' ≈ θ − θ³/2 in the next one: at 1 rad/s (θ = 1/30) it
-//! loses 1.6 % a second, at 10 rad/s it is down to a third after one second. Gyroscopic torques are implicit too, and a
+//! loses 1.6 % in a second, at 10 rad/s half. Gyroscopic torques are implicit too, and a
 //! part that tumbles about its middle axis loses energy, unlike a rigid body, whose free flight is predicted.
 //! Energy falls, at any stiffness; it never rises but by what the solver's tolerance leaves.
 //!
