@@ -8,3 +8,4 @@ pub mod observer;
 pub mod process;
 pub mod server_process;
 pub mod table;
+pub mod yardstick;

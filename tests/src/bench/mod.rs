@@ -3,6 +3,7 @@
 //! Owns the list of entries and how their results are shown. An entry measures and answers a [`Report`]; it prints
 //! nothing, and where it compares with a peer, the peer runs in the same process and the same run.
 
+mod peers;
 mod tick;
 
 use serde_json::{Map, Value};
@@ -10,11 +11,14 @@ use serde_json::{Map, Value};
 use crate::table::table;
 
 /// Every measurement, in the order in which they run.
-pub const ENTRIES: &[Entry] = &[Entry {
-    name: "tick",
-    measures: "a tick of 16 driven cars: ms a stage, iterations, allocations",
-    run: tick::run,
-}];
+pub const ENTRIES: &[Entry] = &[
+    Entry { name: "tick", measures: "a tick of 16 driven cars: ms a stage, iterations, allocations", run: tick::run },
+    Entry {
+        name: "peers",
+        measures: "ours and rapier in turn on the yardstick's scenes: ms, ratio, quality; minutes",
+        run: peers::run,
+    },
+];
 
 /// One named measurement.
 pub struct Entry {
@@ -27,12 +31,16 @@ pub struct Entry {
 }
 
 /// How long and how much to measure.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Options {
     /// Ticks to measure; the entry's own number where there is none.
     pub ticks: Option<u32>,
     /// Threads of the engine; the entry's own number where there is none.
     pub threads: Option<usize>,
+    /// Scenes of the yardstick to measure; all of them where none is named.
+    pub scenes: Vec<String>,
+    /// Times that everything is run, the least of which counts; the entry's own number where there is none.
+    pub rounds: Option<u32>,
 }
 
 /// Why an entry could not measure, for a person.
@@ -45,14 +53,17 @@ pub struct Report {
     pub header: Vec<&'static str>,
     /// Rows of the table.
     pub rows: Vec<Vec<String>>,
+    /// What stands below the table, a paragraph each.
+    pub notes: Vec<String>,
     /// The same for machines, with units in the keys: `tick_p50_ms`.
     pub figures: Map<String, Value>,
 }
 
 impl Report {
-    /// The table, for people.
+    /// The table and what stands below it, for people.
     pub fn text(&self) -> String {
-        table(&self.header, self.rows.iter().cloned()).to_string()
+        let table = table(&self.header, self.rows.iter().cloned()).to_string();
+        [&[table], &self.notes[..]].concat().join("\n")
     }
 }
 

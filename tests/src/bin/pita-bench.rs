@@ -33,6 +33,14 @@ struct Arguments {
     /// Threads of the engine, 1 to 64 [default: each measurement's own]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=64))]
     threads: Option<u16>,
+
+    /// Scenes of the yardstick that `peers` runs, with commas between them [default: all]
+    #[arg(long, value_name = "SCENE", value_delimiter = ',')]
+    scenes: Vec<String>,
+
+    /// Times that `peers` runs everything in turn; the least time counts [default: 3]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    rounds: Option<u32>,
 }
 
 fn main() -> ExitCode {
@@ -42,7 +50,12 @@ fn main() -> ExitCode {
         println!("{}", table(&["name", "measures"], rows));
         return ExitCode::SUCCESS;
     }
-    let options = Options { ticks: arguments.ticks, threads: arguments.threads.map(usize::from) };
+    let options = Options {
+        ticks: arguments.ticks,
+        threads: arguments.threads.map(usize::from),
+        scenes: arguments.scenes,
+        rounds: arguments.rounds,
+    };
     match run(&arguments.names, &options, arguments.json) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
