@@ -1,7 +1,7 @@
 //! `pita-yardstick SCENE_FILE K VARIANT OUT_PREFIX`: runs a `.scene` with K steps a tick and writes what the yardstick's
 //! judge reads, `OUT_PREFIX.tr` and `OUT_PREFIX.ms` (see [`pita_server::trace`]).
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
 
@@ -9,11 +9,12 @@ use clap::Parser;
 use pita_game::scene::Scene;
 use pita_server::trace::{self, Trace};
 use pita_sim::Settings;
+use pita_tests::yardstick::ours::OursError;
 
 #[derive(Parser)]
 #[command(name = "pita-yardstick", version = pita_protocol::build_info::VERSION_AND_COMMIT, about = "Runs a yardstick scene and writes its trace and times")]
 struct Arguments {
-    /// Scene to run.
+    /// Scene file to run, or `soft`: the elastic beam, which has no file.
     scene: PathBuf,
     /// Engine steps per tick of 1/30 s, 1 to 1024.
     #[arg(value_parser = clap::value_parser!(u32).range(1..=1024))]
@@ -37,6 +38,9 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), String> {
     let settings = settings(arguments)?;
     let name = arguments.scene.display();
+    if arguments.scene == Path::new("soft") {
+        return Err(format!("{name}: {}", OursError::NoFiniteElements));
+    }
     let text = std::fs::read_to_string(&arguments.scene).map_err(|error| format!("{name}: {error}"))?;
     let mut scene = Scene::parse(&text, &settings).map_err(|error| format!("{name}, {error}"))?;
     let mut trace = Trace::create(&arguments.out).map_err(|error| error.to_string())?;

@@ -268,3 +268,64 @@ fn slope(tangent: f64) -> RigidScene {
     let items = vec![Item::Plane(plane), Item::Body(cube)];
     RigidScene { ticks: 90, items, ..level(FRICTION) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Hashes of the scenes as they are in the kit.
+    const GOLDEN: &[(&str, &str)] = &[
+        ("pile100", "7eb567b1be98d643"),
+        ("pile500", "cfe5e3029320dbe6"),
+        ("pile1000", "5b37fb65a7428fae"),
+        ("pilethrown500", "dcbde15709dcccea"),
+        ("stack10", "afc671f4325e41a4"),
+        ("stack20", "02a5ca246efa36ce"),
+        ("sheep100", "1e8d8670236c704e"),
+        ("sheep400", "7fd343d5dabf09f8"),
+        ("chain", "fcc0471aaa946d5d"),
+        ("cars16", "6434427892aa8556"),
+        ("cars64", "67d12d9a98bf1b41"),
+        ("cars128", "d5175c04805cc9b1"),
+        ("spin", "348e9f66e23c0206"),
+        ("slope45", "c40195ac5a5d5cc8"),
+        ("slope55", "7da37ba8f8ebfccf"),
+    ];
+
+    /// Numbers to nine decimals: mathematical libraries may differ in the last bit of a sine.
+    fn hash(scene: &RigidScene) -> String {
+        let rounded = |word: &str| match word.parse::<f64>() {
+            // Adding 0 turns -0 into 0.
+            Ok(number) => format!("{:.9}", (number * 1e9).round() / 1e9 + 0.0),
+            Err(_) => word.to_owned(),
+        };
+        let text: Vec<String> = scene.to_string().split_whitespace().map(rounded).collect();
+        blake3::hash(text.join(" ").as_bytes()).to_hex()[..16].to_owned()
+    }
+
+    #[test]
+    fn scenes_are_the_golden_ones() {
+        let hashes = names().filter_map(|name| match content(name)? {
+            Content::Rigid(_, scene) => Some((name, hash(&scene))),
+            Content::Beam(_) => None,
+        });
+        let hashes: Vec<_> = hashes.collect();
+        let golden: Vec<_> = GOLDEN.iter().map(|&(name, hash)| (name, hash.to_owned())).collect();
+        assert_eq!(hashes, golden);
+    }
+
+    #[test]
+    fn a_scene_is_a_scene_file() {
+        for name in names() {
+            let Some(Content::Rigid(_, scene)) = content(name) else { continue };
+            let read = pita_game::scene::Scene::parse(&scene.to_string(), &pita_sim::Settings::at(1.0 / 30.0)).unwrap();
+            assert_eq!((read.ticks, read.bodies.len()), (scene.ticks, scene.bodies().count()), "{name}");
+        }
+    }
+
+    #[test]
+    fn the_beam_has_the_nodes_and_the_mass_that_the_kit_says() {
+        assert_eq!(BEAM.nodes(), 99);
+        assert!((BEAM.mass() - 320.0).abs() < 1e-9);
+    }
+}

@@ -63,3 +63,34 @@ fn overlap(a: &Solid, b: &Solid) -> f64 {
     let along = |axis: DVec3| a.reach(axis) + b.reach(axis) - axis.dot(apart).abs();
     of_a.into_iter().chain(of_b).chain(edges).map(along).fold(f64::INFINITY, f64::min)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pita_sim::DQuat;
+
+    fn cube(x: f64, y: f64, z: f64, rotation: DQuat) -> BodyState {
+        let (velocity, angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
+        BodyState { position: DVec3::new(x, y, z), rotation, velocity, angular_velocity }
+    }
+
+    #[track_caller]
+    fn expect(boxes: &[BodyState], depth: f64) {
+        let found = deepest(boxes, &vec![DVec3::splat(0.5); boxes.len()]);
+        assert!((found - depth).abs() < 1e-12, "{found} is not {depth}");
+    }
+
+    #[test]
+    fn faces_edges_and_the_ground() {
+        let (straight, half) = (DQuat::IDENTITY, 0.5f64.sqrt());
+        let eighth = std::f64::consts::FRAC_PI_4;
+        expect(&[cube(0.0, 0.48, 0.0, straight)], 0.02);
+        expect(&[cube(0.0, half - 0.03, 0.0, DQuat::from_rotation_x(eighth))], 0.03);
+        expect(&[cube(0.0, 2.0, 0.0, straight), cube(0.99, 2.3, 0.0, straight)], 0.01);
+        expect(&[cube(0.0, 2.0, 0.0, straight), cube(1.01, 2.3, 0.0, straight)], 0.0);
+        // Two edges crosswise, each box standing on its edge: apart along y, through the cross product alone.
+        let below = cube(0.0, 2.0, 0.0, DQuat::from_rotation_x(eighth));
+        expect(&[below, cube(0.0, 2.0 + 2.0 * half - 0.05, 0.0, DQuat::from_rotation_z(eighth))], 0.05);
+        expect(&[below, cube(0.0, 2.0 + 2.0 * half + 0.05, 0.0, DQuat::from_rotation_z(eighth))], 0.0);
+    }
+}
