@@ -1,7 +1,7 @@
 //! The DOF interface (talk, "The DOF Interface"): Kinematics, Inertia and Potentials are all the code that a kind needs.
 //!
 //! Particles and rigid bodies are built into the integrator, which predicts their free flight. Every other kind, one of a
-//! game's own included, is a [`Dof`]: `examples/own_kind.rs` makes one.
+//! game's own included, is a [`Dof`]: `examples/own_kind` makes one.
 //!
 //! Rates come in blocks of at most [`BLOCK_RATES_MAX`], the blocks of the sparse system.
 

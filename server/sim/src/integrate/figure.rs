@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::block::{Block, Entry};
-use crate::dof::{Columns, Dof, Frame, Inertia, LocalState, PartLoad, PartPoint, Twist};
+use crate::dof::{Columns, Dof, Frame, Inertia, LocalState, PartInertia, PartLoad, PartPoint, Twist};
 use crate::potential::Wrench;
 
 /// A body of a general kind in an island.
@@ -330,8 +330,7 @@ impl Figure {
                     let mut change = part_momentum(&attached[k], part.mass, part.inertia);
                     change += Wrench { force: -free.force, torque: -free.torque };
                     wrenches[k] += change;
-                    let turn = world_inertia(&attached[k], part.inertia).inverse() * DVec3::from(change.torque);
-                    0.5 * (change.force.dot(change.force) / part.mass + turn.dot(change.torque.into()))
+                    0.5 * (change.force.dot(change.force) / part.mass + turning_energy(&attached[k], part, change))
                 })
                 .sum()
             }
@@ -435,6 +434,15 @@ pub(super) fn pulled_back(a: &Columns, h: &Block<6>, b: &Columns) -> Block<6> {
         }
     }
     std::array::from_fn(|i| std::array::from_fn(|j| (0..6).map(|k| a[i][k] * half[j][k]).sum()))
+}
+
+/// Twice the energy of an angular momentum, J; none for what does not turn.
+fn turning_energy(frame: &Frame<f64>, part: &PartInertia, momentum: Wrench) -> f64 {
+    let momentum = DVec3::from(momentum.torque);
+    if momentum == DVec3::ZERO {
+        return 0.0;
+    }
+    momentum.dot(world_inertia(frame, part.inertia).inverse() * momentum)
 }
 
 /// R I Rᵀ.

@@ -3,11 +3,9 @@
 use std::sync::Arc;
 
 use pita_sim::mass::{Density, MassProperties};
-use pita_sim::{
-    Articulated, BodyId, DVec3, FigureDesc, JointDesc, JointKind, PartDesc, PartPoint, Settings, Shape, World,
-};
+use pita_sim::{Articulated, BodyId, DVec3, FigureDesc, JointDesc, JointKind, PartDesc, PartPoint, Shape, World};
 
-use super::{DT, world};
+use super::{DT, precise, world};
 
 const G: f64 = 9.81;
 
@@ -43,14 +41,6 @@ fn q(world: &World, id: BodyId) -> &[f64] {
 
 fn v(world: &World, id: BodyId) -> &[f64] {
     world.slice(id).unwrap().v
-}
-
-/// A world whose solver leaves next to nothing: what it does is the scheme's.
-fn precise(gravity: DVec3) -> World {
-    let mut settings = Settings { gravity, ..Settings::at(DT) };
-    settings.solver.tolerance = 1e-10;
-    settings.solver.forcing = 1e-6;
-    World::new(settings).unwrap()
 }
 
 /// A compound pendulum swings with ω² = m g r / (I + m r²) as implicit Euler samples it: a tick turns its phase by

@@ -6,6 +6,7 @@ mod collisions;
 mod determinism;
 mod hostile;
 mod joints;
+mod own_kind;
 mod solvers;
 
 use pita_sim::{BodyId, Collider, DQuat, DVec3, ParticleDesc, RigidBodyDesc, Settings, Shape, StaticDesc, World};
@@ -19,6 +20,14 @@ fn world() -> World {
 
 fn weightless() -> World {
     World::new(Settings { gravity: DVec3::ZERO, ..Settings::at(DT) }).unwrap()
+}
+
+/// A world whose solver leaves next to nothing: what it does is the scheme's.
+fn precise(gravity: DVec3) -> World {
+    let mut settings = Settings { gravity, ..Settings::at(DT) };
+    settings.solver.tolerance = 1e-10;
+    settings.solver.forcing = 1e-6;
+    World::new(settings).unwrap()
 }
 
 fn particle(world: &mut World, position: DVec3, velocity: DVec3, mass: f64) -> BodyId {
