@@ -27,6 +27,14 @@ pub(super) enum Fill {
     Complete,
 }
 
+/// What a factorisation took.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Factorised {
+    pub multiply_adds: u64,
+    /// Pivots that were not positive definite.
+    pub breakdowns: usize,
+}
+
 /// A factor with its pattern and memory.
 #[derive(Default)]
 pub(super) struct Factorization<const D: usize> {
@@ -106,9 +114,9 @@ impl<const D: usize> Factorization<D> {
         (self.diagonal.len() + 2 * self.columns.len()) as u64 * block(D)
     }
 
-    /// Computes L for a matrix of the pattern that was analysed. Answers the multiply-adds.
-    pub fn factorise(&mut self, a: &Matrix<D>) -> u64 {
-        let mut products = 0;
+    /// Computes L for a matrix of the pattern that was analysed.
+    pub fn factorise(&mut self, a: &Matrix<D>) -> Factorised {
+        let (mut products, mut breakdowns) = (0, 0);
         for i in 0..a.diagonal.len() {
             let mut diagonal = a.diagonal[i];
             let mut of_a = a.row(i).peekable();
@@ -124,12 +132,14 @@ impl<const D: usize> Factorization<D> {
                 product_sub(&block, &block, &mut diagonal);
                 self.lower[k] = block;
             }
-            self.diagonal[i] = cholesky(&diagonal, PIVOT_FLOOR)
-                .or_else(|| cholesky(&a.diagonal[i], 0.0))
-                .unwrap_or_else(|| root_of_diagonal(&a.diagonal[i]));
+            self.diagonal[i] = cholesky(&diagonal, PIVOT_FLOOR).unwrap_or_else(|| {
+                breakdowns += 1;
+                own_factor(&a.diagonal[i])
+            });
         }
         // Each block is solved for (half a product) and multiplied with itself (another half).
-        (products + self.columns.len() as u64) * block_product(D) + self.diagonal.len() as u64 * block_product(D) / 6
+        let off_diagonal = (products + self.columns.len() as u64) * block_product(D);
+        Factorised { multiply_adds: off_diagonal + self.diagonal.len() as u64 * block_product(D) / 6, breakdowns }
     }
 
     /// x ← (L Lᵀ)⁻¹ x.
@@ -176,13 +186,15 @@ impl<const D: usize> Factorization<D> {
     }
 }
 
-/// Last resort for a diagonal block that rounding has made indefinite: the root of its diagonal.
-pub(super) fn root_of_diagonal<const D: usize>(a: &Block<D>) -> Block<D> {
-    let mut l = zero();
-    for i in 0..D {
-        l[i][i] = a[i][i].abs().max(f64::MIN_POSITIVE).sqrt();
-    }
-    l
+/// Cholesky factor of a diagonal block by itself; of its diagonal alone where rounding has made it indefinite.
+pub(super) fn own_factor<const D: usize>(a: &Block<D>) -> Block<D> {
+    cholesky(a, 0.0).unwrap_or_else(|| {
+        let mut l = zero();
+        for i in 0..D {
+            l[i][i] = a[i][i].abs().max(f64::MIN_POSITIVE).sqrt();
+        }
+        l
+    })
 }
 
 #[cfg(test)]

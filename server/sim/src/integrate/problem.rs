@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::block::{Entry, dot};
+use super::block::Entry;
 use super::figure::Figures;
 use crate::autodiff::Dual;
 use crate::dof::{BLOCK_RATES_MAX, Frame, Node, Twist};
@@ -250,12 +250,6 @@ impl Problem {
     pub(super) fn divide_by_mass<const D: usize>(&self, p: &[Entry<D>], v: &mut Vec<Entry<D>>) {
         v.clear();
         v.extend(self.unknowns.iter().zip(p).map(|(unknown, p)| unknown.divide_by_mass(p)));
-    }
-
-    /// ½ RᵀM⁻¹R: the kinetic energy of the momentum that is missing, J.
-    pub(super) fn merit<const D: usize>(&self, residual: &[Entry<D>]) -> f64 {
-        let missing = |(unknown, r): (&Unknown, &Entry<D>)| dot(r, &unknown.divide_by_mass(r));
-        0.5 * self.unknowns.iter().zip(residual).map(missing).sum::<f64>()
     }
 
     /// Takes what is frozen during a Newton iteration from the candidate.

@@ -1,7 +1,7 @@
 //! Block Jacobi: each body's own block, as if it were alone.
 
-use super::super::block::{Block, Entry, backward_substitute, cholesky, forward_substitute};
-use super::super::factorization::root_of_diagonal;
+use super::super::block::{Block, Entry, backward_substitute, forward_substitute};
+use super::super::factorization::own_factor;
 use super::super::matrix::Matrix;
 use super::super::solver::work::{block, block_product};
 use super::ApproximateInverse;
@@ -24,7 +24,7 @@ impl<const D: usize> BlockJacobi<D> {
 impl<const D: usize> ApproximateInverse<D> for BlockJacobi<D> {
     fn prepare(&mut self, a: &Matrix<D>) -> u64 {
         self.factors.clear();
-        self.factors.extend(a.diagonal.iter().map(|b| cholesky(b, 0.0).unwrap_or_else(|| root_of_diagonal(b))));
+        self.factors.extend(a.diagonal.iter().map(own_factor));
         a.diagonal.len() as u64 * block_product(D) / 6
     }
 

@@ -17,7 +17,7 @@ impl<const D: usize> ApproximateInverse<D> for IncompleteFactorization<D> {
     }
 
     fn prepare(&mut self, a: &Matrix<D>) -> u64 {
-        self.factorization.factorise(a)
+        self.factorization.factorise(a).multiply_adds
     }
 
     fn apply(&self, _a: &Matrix<D>, x: &mut [Entry<D>]) {

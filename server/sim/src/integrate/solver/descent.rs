@@ -13,8 +13,8 @@ use crate::settings::SolverSettings;
 /// A walk that changes no unknown by more than this fraction of the largest goes nowhere: some units of rounding.
 const STANDSTILL: f64 = 1e-15;
 
-/// Passes over vectors in an iteration, besides a method's own: two products for the slope, and the merit.
-const VECTORS_AN_ITERATION: u64 = 3;
+/// Passes over vectors in an iteration, besides a method's own: the norm of the residual, and the slope.
+const VECTORS_AN_ITERATION: u64 = 2;
 
 /// Passes over vectors in each step of a line search: copy, add, product.
 const VECTORS_A_TRIAL: u64 = 3;
@@ -82,10 +82,9 @@ impl<const D: usize> Descent<D> {
     fn relinearise(&mut self, problem: &mut Problem, work: &mut Work, report: &mut SolveReport) {
         problem.relinearise();
         work.told_potentials();
-        problem.evaluate(&mut self.residual);
+        report.merit = problem.evaluate(&mut self.residual);
         work.evaluated();
         report.residual = problem.residual_speed(&self.residual);
-        report.merit = problem.merit(&self.residual);
         work.vectors(VECTORS_AN_ITERATION);
         if report.merit < self.best.merit {
             self.best.u.clone_from(&self.u);

@@ -3,18 +3,27 @@
 //!
 //! Exactly: forward differences of the residual in the pattern of the Hessian. Bodies that share no neighbour are moved
 //! together (Curtis, Powell and Reid, 1974), so that an evaluation serves a column of each; what comes twice, once from
-//! either side of the diagonal, is averaged. The Newton system is then solved as by [`newton`](super::newton).
+//! either side of the diagonal, is averaged. Differences know nothing of positive parts: where the factorisation finds
+//! the matrix indefinite, the diagonal is made heavier, as Marquardt did. The Newton system is then solved as by
+//! [`newton`](super::newton).
 
 use super::super::block::{Block, Entry, zero};
 use super::super::matrix::Matrix;
 use super::super::problem::Problem;
 use super::newton::Newton;
+use super::work::Work;
 use super::{Solver, Standpoint};
-use crate::integrate::solver::work::Work;
 
 /// By how much an unknown is moved, m/s and rad/s: a displacement of 3e-8 m in a tick, small against the millimetre over
 /// which contacts change, and large against the rounding of positions.
 const DIFFERENCE: f64 = 1e-6;
+
+/// By which fraction the diagonal is made heavier at first where the matrix is indefinite; ten times more at each further
+/// try.
+const LEAST_DAMPING: f64 = 1e-3;
+
+/// The last try. Beyond it steps become too short to lead anywhere; pivots that are indefinite still are replaced.
+const MOST_DAMPING: f64 = 0.1;
 
 /// The method's memory.
 #[derive(Default)]
@@ -162,6 +171,14 @@ impl<const D: usize> Solver<D> for DiscreteNewton<D> {
             self.newton.analyse(at.matrix);
         }
         self.difference(at.problem, at.u, at.residual, at.work, at.matrix);
-        self.newton.solve(at, step)
+        let mut damping = LEAST_DAMPING;
+        while self.newton.factorise(at.matrix, at.work) > 0 && damping <= MOST_DAMPING {
+            for block in &mut at.matrix.diagonal {
+                (0..D).for_each(|i| block[i][i] += damping * block[i][i].abs());
+            }
+            damping *= 10.0;
+        }
+        self.newton.solve(at.residual, at.work, step);
+        1
     }
 }

@@ -100,7 +100,9 @@ pub(crate) struct SolveReport {
     pub work: u64,
     /// Largest residual of a body at the end, m/s.
     pub residual: f64,
-    /// ½ RᵀM⁻¹R at the end: the kinetic energy of the momentum that is missing, J.
+    /// What is made small: the incremental potential at the end, with friction limited as at the end, J. The norm of the
+    /// residual would not do: it is stiffness times what is missing, and rises along the curved valleys of joints, at
+    /// whose bottom the solution is.
     pub merit: f64,
     pub stopped_because: StoppedBecause,
 }

@@ -3,9 +3,10 @@
 //! elimination order.
 
 use super::super::block::Entry;
-use super::super::factorization::{Factorization, Fill};
+use super::super::factorization::{Factorised, Factorization, Fill};
 use super::super::matrix::Matrix;
 use super::super::vector::negate;
+use super::work::Work;
 use super::{Solver, Standpoint};
 
 /// The method's memory.
@@ -21,14 +22,19 @@ impl<const D: usize> Newton<D> {
         self.factorization.complete_work() + self.factorization.solve_work()
     }
 
-    /// Solves with the matrix as it is.
-    pub fn solve(&mut self, at: Standpoint<D>, step: &mut Vec<Entry<D>>) -> usize {
-        at.work.add(self.factorization.factorise(at.matrix));
-        negate(at.residual, step);
+    /// Factorises the matrix as it is. Answers how many of its pivots are not positive definite.
+    pub fn factorise(&mut self, a: &Matrix<D>, work: &mut Work) -> usize {
+        let Factorised { multiply_adds, breakdowns } = self.factorization.factorise(a);
+        work.add(multiply_adds);
+        breakdowns
+    }
+
+    /// step ← −A⁻¹ R.
+    pub fn solve(&self, residual: &[Entry<D>], work: &mut Work, step: &mut Vec<Entry<D>>) {
+        negate(residual, step);
         self.factorization.solve(step);
-        at.work.vectors(1);
-        at.work.add(self.factorization.solve_work());
-        1
+        work.vectors(1);
+        work.add(self.factorization.solve_work());
     }
 }
 
@@ -38,6 +44,8 @@ impl<const D: usize> Solver<D> for Newton<D> {
         if at.iteration == 0 {
             self.analyse(at.matrix);
         }
-        self.solve(at, step)
+        self.factorise(at.matrix, at.work);
+        self.solve(at.residual, at.work, step);
+        1
     }
 }
