@@ -31,12 +31,40 @@ pub(super) struct Descent<const D: usize> {
     matrix: Matrix<D>,
 }
 
-/// The state with the least merit so far.
+/// Merits that differ by less than this share of what has been gained since the start are alike, and the residual
+/// decides: friction's limits, which every iteration takes anew, move the merit too.
+const ALIKE: f64 = 0.01;
+
+/// The best state so far.
 #[derive(Default)]
 struct Best<const D: usize> {
     u: Vec<Entry<D>>,
+    /// J.
     merit: f64,
+    /// m/s.
     residual: f64,
+    /// Merit of the start, J.
+    first_merit: f64,
+}
+
+impl<const D: usize> Best<D> {
+    fn forget(&mut self) {
+        (self.merit, self.residual, self.first_merit) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
+    }
+
+    /// Takes the state if it is better.
+    fn offer(&mut self, u: &[Entry<D>], merit: f64, residual: f64) {
+        if !self.merit.is_finite() {
+            self.first_merit = merit;
+        }
+        let slack = ALIKE * (self.first_merit - self.merit.min(merit)).max(0.0);
+        let better = merit < self.merit - slack || merit <= self.merit + slack && residual < self.residual;
+        if better && residual.is_finite() {
+            self.u.clear();
+            self.u.extend_from_slice(u);
+            (self.merit, self.residual) = (merit, residual);
+        }
+    }
 }
 
 impl<const D: usize> Descent<D> {
@@ -52,7 +80,7 @@ impl<const D: usize> Descent<D> {
         let mut work = Work::begin::<D>(problem, budget);
         let mut report = SolveReport::default();
         guess(problem, settings, &mut work, &mut self.u, &mut self.start, &mut self.residual);
-        self.best.merit = f64::INFINITY;
+        self.best.forget();
         loop {
             self.relinearise(problem, &mut work, &mut report);
             if let Some(reason) = self.reason_to_stop(settings, &work, &report) {
@@ -86,10 +114,7 @@ impl<const D: usize> Descent<D> {
         work.evaluated();
         report.residual = problem.residual_speed(&self.residual);
         work.vectors(VECTORS_AN_ITERATION);
-        if report.merit < self.best.merit {
-            self.best.u.clone_from(&self.u);
-            (self.best.merit, self.best.residual) = (report.merit, report.residual);
-        }
+        self.best.offer(&self.u, report.merit, report.residual);
     }
 
     fn reason_to_stop(&self, settings: &SolverSettings, work: &Work, report: &SolveReport) -> Option<StoppedBecause> {
@@ -135,9 +160,9 @@ impl<const D: usize> Descent<D> {
 
     /// One body's overflow must not spread over its island, nor a last step that went wrong.
     fn return_to_best(&mut self, problem: &mut Problem, report: &mut SolveReport) {
-        let Best { u, merit, residual } = &self.best;
-        let is_at_best = report.stopped_because == StoppedBecause::Tolerance || report.merit <= *merit;
-        if !is_at_best && merit.is_finite() {
+        let Best { u, merit, residual, .. } = &self.best;
+        let is_there = report.stopped_because == StoppedBecause::Tolerance || *u == self.u;
+        if !is_there && merit.is_finite() {
             problem.move_to(u);
             (report.merit, report.residual) = (*merit, *residual);
         }

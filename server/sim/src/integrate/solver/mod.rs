@@ -87,8 +87,8 @@ pub enum StoppedBecause {
     NonFinite,
 }
 
-/// What solving an island took, and where it ended. Unless it stopped because of the tolerance, it ended at the state with
-/// the least merit that it saw.
+/// What solving an island took, and where it ended: unless it stopped because of the tolerance, at the best state that it
+/// saw, which is the one with the least merit, or with the least residual among those about as good.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct SolveReport {
     pub iterations: usize,
