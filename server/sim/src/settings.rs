@@ -27,7 +27,8 @@ pub struct SolverSettings {
     pub method: Method,
     /// Of conjugate gradients, in [`Method::TruncatedNewton`] and [`Method::NonlinearConjugateGradient`].
     pub preconditioner: Preconditioner,
-    /// A solver stops when no body's residual is larger, m/s. 1e-2 is invisible in piles, but sticks what should slide.
+    /// A solver stops when no body's acceleration is wrong by more, m/s². Ten times the default is invisible in piles, but
+    /// sticks what should slide.
     pub tolerance: f64,
     /// Most iterations an island gets; `None` is the method's own limit, [`Method::iterations`].
     pub iterations: Option<usize>,
@@ -79,7 +80,7 @@ impl Settings {
         require(self.dt > 0.0 && self.dt <= 1.0, "dt", self.dt, "above 0, at most 1 s")?;
         require_vector(self.gravity, "gravity")?;
         require((1..=64).contains(&self.threads), "threads", self.threads as f64, "1 to 64")?;
-        require(solver.tolerance > 0.0, "solver.tolerance", solver.tolerance, "above 0 m/s")?;
+        require(solver.tolerance > 0.0, "solver.tolerance", solver.tolerance, "above 0 m/s²")?;
         let iterations = solver.iterations();
         require((1..=100_000).contains(&iterations), "solver.iterations", iterations as f64, "1 to 100000")?;
         require((1e-12..1.0).contains(&solver.forcing), "solver.forcing", solver.forcing, "1e-12 to below 1")?;
@@ -107,7 +108,7 @@ impl Default for SolverSettings {
         Self {
             method: Method::default(),
             preconditioner: Preconditioner::default(),
-            tolerance: 1e-3,
+            tolerance: 0.03,
             iterations: None,
             budget: None,
             forcing: 0.1,

@@ -45,7 +45,7 @@ pub struct StepReport {
     pub unconverged_islands: usize,
     /// Islands that stopped because their share of the budget was used up.
     pub out_of_budget_islands: usize,
-    /// Largest residual of any body at the end, m/s.
+    /// Largest residual of any body at the end, as the speed that it misses, m/s.
     pub residual: f64,
     /// Deepest contact at the end of the tick, m.
     pub worst_penetration: f64,

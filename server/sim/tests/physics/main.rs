@@ -25,7 +25,7 @@ fn weightless() -> World {
 /// A world whose solver leaves next to nothing: what it does is the scheme's.
 fn precise(gravity: DVec3) -> World {
     let mut settings = Settings { gravity, ..Settings::at(DT) };
-    settings.solver.tolerance = 1e-10;
+    settings.solver.tolerance = 3e-9;
     settings.solver.forcing = 1e-6;
     World::new(settings).unwrap()
 }

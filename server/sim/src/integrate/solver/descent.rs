@@ -83,7 +83,7 @@ impl<const D: usize> Descent<D> {
         self.best.forget();
         loop {
             self.relinearise(problem, &mut work, &mut report);
-            if let Some(reason) = self.reason_to_stop(settings, &work, &report) {
+            if let Some(reason) = self.reason_to_stop(problem.dt, settings, &work, &report) {
                 report.stopped_because = reason;
                 break;
             }
@@ -98,7 +98,7 @@ impl<const D: usize> Descent<D> {
             if !moved {
                 self.relinearise(problem, &mut work, &mut report);
                 report.stopped_because =
-                    self.reason_to_stop(settings, &work, &report).unwrap_or(StoppedBecause::Stagnation);
+                    self.reason_to_stop(problem.dt, settings, &work, &report).unwrap_or(StoppedBecause::Stagnation);
                 break;
             }
         }
@@ -117,11 +117,17 @@ impl<const D: usize> Descent<D> {
         self.best.offer(&self.u, report.merit, report.residual);
     }
 
-    fn reason_to_stop(&self, settings: &SolverSettings, work: &Work, report: &SolveReport) -> Option<StoppedBecause> {
+    fn reason_to_stop(
+        &self,
+        dt: f64,
+        settings: &SolverSettings,
+        work: &Work,
+        report: &SolveReport,
+    ) -> Option<StoppedBecause> {
         if !report.residual.is_finite() {
             return Some(StoppedBecause::NonFinite);
         }
-        if report.residual <= settings.tolerance {
+        if report.residual <= settings.tolerance * dt {
             return Some(StoppedBecause::Tolerance);
         }
         if report.iterations >= settings.iterations() {

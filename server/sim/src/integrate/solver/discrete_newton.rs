@@ -182,3 +182,66 @@ impl<const D: usize> Solver<D> for DiscreteNewton<D> {
         1
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::super::matrix::tests::{matrix, pattern};
+    use super::super::super::problem::Guess;
+    use super::super::tests::net;
+    use super::*;
+
+    /// Stretched springs have the Hessian that is assembled, so their differences must come to it.
+    #[test]
+    fn differences_come_to_the_assembled_hessian() {
+        let (mut problem, mut u, mut residual) = (net(3e3), Vec::new(), Vec::new());
+        problem.guess::<3>(Guess::Before, &mut u);
+        problem.move_to(&u);
+        problem.evaluate(&mut residual);
+        let (mut assembled, mut differenced) = (Matrix::<3>::default(), Matrix::<3>::default());
+        for matrix in [&mut assembled, &mut differenced] {
+            matrix.analyse(&mut problem);
+            matrix.assemble(&mut problem);
+        }
+        let mut method = DiscreteNewton::default();
+        method.colours.find(&differenced);
+        let mut work = Work::unlimited();
+        method.difference(&mut problem, &u, &residual, &mut work, &mut differenced);
+        assert_eq!(work.evaluations(), 3 * method.colours.colours as usize);
+        assert!(method.colours.colours < problem.len() as u32, "nothing was moved together");
+        let size = assembled.diagonal.as_flattened().as_flattened().iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        let blocks = |m: &Matrix<3>| [m.diagonal.clone(), m.lower.clone()].concat();
+        for (a, d) in blocks(&assembled)
+            .as_flattened()
+            .as_flattened()
+            .iter()
+            .zip(blocks(&differenced).as_flattened().as_flattened())
+        {
+            assert!((a - d).abs() < 1e-5 * size, "{a} {d} of {size}");
+        }
+        let mut product = Vec::new();
+        problem.hessian_product(&u, &mut product);
+        let mut expected = vec![[0.0; 3]; u.len()];
+        assembled.multiply(&u, &mut expected);
+        for (p, e) in product.as_flattened().iter().zip(expected.as_flattened()) {
+            assert!((p - e).abs() < 1e-9 * size, "{p} {e} of {size}");
+        }
+    }
+
+    proptest! {
+        /// Neither neighbours nor those with a neighbour in common have the same colour.
+        #[test]
+        fn bodies_of_one_colour_are_far_apart(pairs in pattern(9)) {
+            let (matrix, _) = matrix(9, &pairs, &[0.0]);
+            let mut colours = Colouring::default();
+            colours.find(&matrix);
+            let near = |i: u32, j: u32| i == j || pairs.contains(&(i.max(j), i.min(j)));
+            for (i, j) in (0..9).flat_map(|i| (0..i).map(move |j| (i, j))) {
+                let share = (0..9).any(|k| near(i, k) && near(k, j));
+                prop_assert!(!share || colours.colour[i as usize] != colours.colour[j as usize], "{} {}", i, j);
+            }
+            prop_assert!(colours.colour.iter().all(|&colour| colour < colours.colours));
+        }
+    }
+}

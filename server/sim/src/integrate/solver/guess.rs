@@ -25,7 +25,7 @@ pub(super) fn guess<const D: usize>(
             least = energy;
             std::mem::swap(u, scratch);
         }
-        if i == 0 && problem.residual_speed(residual) <= settings.tolerance {
+        if i == 0 && problem.residual_speed(residual) <= settings.tolerance * problem.dt {
             return;
         }
     }

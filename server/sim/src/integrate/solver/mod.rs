@@ -17,6 +17,8 @@ mod quasi_newton;
 mod sor;
 mod steepest_descent;
 mod step_length;
+#[cfg(test)]
+mod tests;
 mod truncated_newton;
 pub(super) mod work;
 
@@ -98,7 +100,7 @@ pub(crate) struct SolveReport {
     pub evaluations: usize,
     /// Block operations, see [`work`].
     pub work: u64,
-    /// Largest residual of a body at the end, m/s.
+    /// Largest residual of a body at the end, as the speed that it misses, m/s.
     pub residual: f64,
     /// What is made small: the incremental potential at the end, with friction limited as at the end, J. The norm of the
     /// residual would not do: it is stiffness times what is missing, and rises along the curved valleys of joints, at
@@ -126,7 +128,13 @@ pub(crate) struct Solvers<const D: usize> {
 impl<const D: usize> Solvers<D> {
     /// Moves `problem`'s trial to the end of the tick, within `budget` block operations.
     pub fn solve(&mut self, problem: &mut Problem, settings: &SolverSettings, budget: Option<u64>) -> SolveReport {
-        let method: &mut dyn Solver<D> = match settings.method {
+        let (method, descent) = self.parts(settings.method);
+        descent.solve(method, problem, settings, budget)
+    }
+
+    /// A method, and what drives it.
+    fn parts(&mut self, method: Method) -> (&mut dyn Solver<D>, &mut Descent<D>) {
+        let method: &mut dyn Solver<D> = match method {
             Method::Auto => &mut self.auto,
             Method::Jacobi => &mut self.jacobi,
             Method::GaussSeidel => &mut self.gauss_seidel,
@@ -138,6 +146,6 @@ impl<const D: usize> Solvers<D> {
             Method::QuasiNewton => &mut self.quasi_newton,
             Method::TruncatedNewton => &mut self.truncated_newton,
         };
-        self.descent.solve(method, problem, settings, budget)
+        (method, &mut self.descent)
     }
 }
