@@ -8,12 +8,14 @@
 mod checks;
 mod key;
 mod shape;
+mod solver;
 mod tables;
 
 use pita_sim::SimError;
 
 pub use key::Key;
 pub use shape::{Angles, Material, ShapeFile};
+pub use solver::SolverFile;
 pub use tables::{ArenaFile, BoundsFile, DriverFile, PropFile, RouteFile, SpawnFile, SpawnGridFile, StaticFile};
 
 /// Longest arena file, bytes: a bound on what reading it can cost.

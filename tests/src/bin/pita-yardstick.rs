@@ -8,7 +8,7 @@ use std::str::FromStr;
 use clap::Parser;
 use pita_game::scene::Scene;
 use pita_server::trace::{self, Trace};
-use pita_sim::Settings;
+use pita_sim::{Settings, SimError};
 use pita_tests::yardstick::ours::OursError;
 
 #[derive(Parser)]
@@ -19,7 +19,8 @@ struct Arguments {
     /// Engine steps per tick of 1/30 s, 1 to 1024.
     #[arg(value_parser = clap::value_parser!(u32).range(1..=1024))]
     steps: u32,
-    /// Comma list of solver options: default, newton=N, tol=M/S, forcing=X, kn=X, kt=X, kj=X, threads=N.
+    /// Comma list of solver options: default, method=NAME, preconditioner=NAME, iterations=N, tol=M/S², budget=N,
+    /// forcing=X, kn=X, kt=X, kj=X, threads=N.
     variant: String,
     /// Path prefix of the two files that are written.
     out: PathBuf,
@@ -62,11 +63,17 @@ fn settings(arguments: &Arguments) -> Result<Settings, String> {
     let mut settings = Settings::at(1.0 / (30.0 * f64::from(arguments.steps)));
     for option in arguments.variant.split(',').filter(|&option| option != "default") {
         let unknown = || {
-            format!("variant option {option:?}: expected default, newton=N, tol=, forcing=, kn=, kt=, kj= or threads=N")
+            format!(
+                "variant option {option:?}: expected default, method=, preconditioner=, iterations=, tol=, budget=, \
+                 forcing=, kn=, kt=, kj= or threads="
+            )
         };
         let (key, value) = option.split_once('=').ok_or_else(unknown)?;
         match key {
-            "newton" => settings.solver.iterations = Some(parsed(option, value, "a whole number")?),
+            "method" => settings.solver.method = named(option, value)?,
+            "preconditioner" => settings.solver.preconditioner = named(option, value)?,
+            "iterations" => settings.solver.iterations = Some(parsed(option, value, "a whole number")?),
+            "budget" => settings.solver.budget = Some(parsed(option, value, "a whole number")?),
             "tol" => settings.solver.tolerance = parsed(option, value, "a number")?,
             "forcing" => settings.solver.forcing = parsed(option, value, "a number")?,
             "kj" => settings.solver.joint_stiffness = parsed(option, value, "a number")?,
@@ -78,6 +85,11 @@ fn settings(arguments: &Arguments) -> Result<Settings, String> {
     }
     settings.validate().map_err(|error| format!("variant {:?}: {error}", arguments.variant))?;
     Ok(settings)
+}
+
+/// The engine's value of a name.
+fn named<T: FromStr<Err = SimError>>(option: &str, value: &str) -> Result<T, String> {
+    value.parse().map_err(|error| format!("variant option {option:?}: {error}"))
 }
 
 /// The value of an option.

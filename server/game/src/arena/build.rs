@@ -22,7 +22,8 @@ impl Arena {
         Key::new("tick_hz").count(settings.tick_hz.into(), 1, 1_000, "Hz")?;
         let dt = 1.0 / f64::from(settings.tick_hz);
         let gravity = DVec3::NEG_Y * file.gravity;
-        let world = World::new(Settings { gravity, threads: settings.threads, ..Settings::at(dt) })
+        let solver = file.solver.settings();
+        let world = World::new(Settings { gravity, solver, threads: settings.threads, ..Settings::at(dt) })
             .map_err(refused(&Key::new("settings")))?;
         let mut arena = Self {
             name: file.name.clone(),

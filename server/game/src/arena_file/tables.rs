@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use serde::Deserialize;
 
-use super::{Angles, Material, ShapeFile};
+use super::{Angles, Material, ShapeFile, SolverFile};
 use crate::vehicle::VehicleParameters;
 
 /// A whole file.
@@ -21,6 +21,9 @@ pub struct ArenaFile {
     /// Acceleration downwards, m/s².
     #[serde(default = "standard_gravity")]
     pub gravity: f64,
+    /// How the engine integrates.
+    #[serde(default)]
+    pub solver: SolverFile,
     /// Box of the world.
     #[serde(default)]
     pub bounds: BoundsFile,

@@ -2,6 +2,7 @@
 
 use pita_game::vehicle::VehicleParameters;
 use pita_game::{Arena, ArenaError};
+use pita_sim::{Method, SolverSettings};
 
 use crate::test_track::{FLAT, SETTINGS};
 
@@ -22,6 +23,15 @@ fn shipped_files_load() {
     assert_eq!((arena.name(), arena.title()), ("proving-ground", "Proving ground"));
 }
 
+#[test]
+fn arenas_choose_their_solver() {
+    let text = FLAT.replacen("[materials", "[solver]\nmethod = \"sor\"\nsweeps = 9\nbudget = 77\n[materials", 1);
+    let arena = Arena::from_toml(&text, &SETTINGS).expect("a good file");
+    let solver = &arena.world().settings().solver;
+    assert_eq!((solver.method, solver.sweeps, solver.budget), (Method::Sor, 9, Some(77)));
+    assert_eq!(solver.relaxation, SolverSettings::default().relaxation);
+}
+
 /// Replacement in the flat arena's file, and what the error has to say.
 const BAD: &[(&str, &str, &[&str])] = &[
     ("name = \"flat\"", "name = \"Flat Arena\"", &["name is Flat Arena", "1 to 32 of a-z 0-9 - _"]),
@@ -36,6 +46,18 @@ const BAD: &[(&str, &str, &[&str])] = &[
         "[bounds]\nmin = [-9, 0, -9]\nmax = [9, 9, 9]\n[materials",
         &["spawn_grids[0].corner[0] is -28", "-9 to 9 m, the bounds"],
     ),
+    (
+        "[materials",
+        "[solver]\nmethod = \"newtn\"\n[materials",
+        &["line 8, column 10", "method \"newtn\" is unknown", "sor"],
+    ),
+    (
+        "[materials",
+        "[solver]\nmetod = \"newton\"\n[materials",
+        &["line 8, column 1", "unknown field `metod`", "method"],
+    ),
+    ("[materials", "[solver]\nrelaxation = 2\n[materials", &["settings: solver.relaxation is 2", "above 0, below 2"]),
+    ("[materials", "[solver]\niterations = 0\n[materials", &["settings: solver.iterations is 0", "1 to 100000"]),
     ("max_players = 64", "max_playerz = 64", &["line 5, column 1", "unknown field `max_playerz`", "max_players"]),
     ("max_players = 64", "", &["missing field `max_players`"]),
     ("friction = 1.0", "friction = -0.5", &["materials.asphalt.friction is -0.5", "0 to 5"]),
