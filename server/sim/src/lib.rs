@@ -24,6 +24,7 @@ mod error;
 pub mod integrate;
 mod island;
 pub mod mass;
+pub mod mesh;
 pub mod potential;
 mod settings;
 mod state;

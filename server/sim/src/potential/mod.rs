@@ -7,6 +7,7 @@
 pub(crate) mod axle;
 pub(crate) mod ball_joint;
 pub(crate) mod contact;
+pub mod elasticity;
 pub(crate) mod pd;
 pub(crate) mod spring;
 #[cfg(test)]
