@@ -116,7 +116,7 @@ impl Scene {
         let [i, j, ax, ay, az, bx, by, bz] = line.numbers()?;
         let a = Anchor { body: self.body(i, line)?, part: 0, point: DVec3::new(ax, ay, az) };
         let b = Anchor { body: self.body(j, line)?, part: 0, point: DVec3::new(bx, by, bz) };
-        Ok(self.world.add_ball_joint(BallJointDesc { a, b }).map(|_| ()))
+        Ok(self.world.add_ball_joint(BallJointDesc::new(a, b)).map(|_| ()))
     }
 
     fn add_wheel(&mut self, line: &Line) -> Result<Result<(), SimError>, SceneError> {

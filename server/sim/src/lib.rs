@@ -37,8 +37,8 @@ pub use error::SimError;
 pub use glam::{DMat3, DQuat, DVec3};
 pub use integrate::{Method, Preconditioner, StepReport, StoppedBecause};
 pub use potential::{
-    Anchor, AxleControl, AxleDesc, AxleId, BallJointDesc, BallJointId, Motor, PdControl, PdDesc, PdId, SpringDesc,
-    SpringId,
+    Anchor, AxleControl, AxleDesc, AxleId, BallJointDesc, BallJointId, Motor, PdControl, PdDesc, PdId, RodDesc, RodId,
+    SpringDesc, SpringId,
 };
 pub use settings::{ContactSettings, Settings, SolverSettings};
 pub use world::{Energy, Momentum, SliceView, World};

@@ -9,6 +9,7 @@ use super::{Motion, Pose};
 use crate::collide::Collider;
 use crate::error::{LARGEST, SimError, require};
 use crate::integrate::figure::part_momentum;
+use crate::potential::hold::Memory;
 
 /// A body of a general kind to be added.
 pub struct FigureDesc {
@@ -42,6 +43,8 @@ pub(crate) struct FigureBody {
     pub masses: Vec<f64>,
     /// kg.
     pub mass: f64,
+    /// Of each of the kind's rods.
+    pub rods: Vec<Memory>,
 }
 
 impl std::fmt::Debug for FigureBody {
@@ -92,7 +95,8 @@ impl FigureBody {
             Inertia::Points(masses) => masses.total(),
         };
         let masses = masses(&*desc.dof, &desc.q);
-        Self { change: vec![0.0; desc.v.len()], masses, mass, dof: desc.dof, colliders: desc.colliders }
+        let (change, rods) = (vec![0.0; desc.v.len()], vec![Memory::default(); desc.dof.rods().len()]);
+        Self { change, masses, mass, rods, dof: desc.dof, colliders: desc.colliders }
     }
 
     /// Pose of the frame at a material point.

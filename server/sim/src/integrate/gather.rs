@@ -10,7 +10,9 @@ use crate::island::Place;
 use crate::potential::axle::AxleTerm;
 use crate::potential::ball_joint::BallJointTerm;
 use crate::potential::contact::ContactTerm;
+use crate::potential::hold::{Held, STRONGEST, Scale};
 use crate::potential::pd::PdTerm;
+use crate::potential::rod::RodTerm;
 use crate::potential::spring::SpringTerm;
 use crate::potential::{Anchor, End, FIXED};
 use crate::settings::Settings;
@@ -82,6 +84,11 @@ impl Integrator {
             let members = self.islands.members(i).iter();
             solve.problem.unknowns.extend(members.map(|&m| self.unknowns[m as usize]));
         }
+        for active in &self.active {
+            if let Some(solve) = self.solves.get_mut(self.islands.place(active.first).island as usize) {
+                solve.mass += scene.bodies[active.id].mass;
+            }
+        }
         self.place_figures(scene);
     }
 
@@ -95,6 +102,7 @@ impl Integrator {
                 islands.unite(active.first, active.first + i);
             }
             let mut couple = |a: u32, b: u32| islands.couple(active.first + a, active.first + b);
+            dof.rods().iter().for_each(|rod| couple(rod.points[0], rod.points[1]));
             dof.couplings(&mut |a, b| couple(a as u32, b as u32));
             match dof.inertia() {
                 Inertia::Points(masses) => masses.off_diagonal.iter().for_each(|&(a, b, _)| couple(a, b)),
@@ -184,13 +192,20 @@ impl Integrator {
         let Settings { dt, solver, .. } = scene.settings;
         for desc in scene.potentials.springs.values() {
             let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
-            let points = ends.map(|end| solve.start(end).place(end.point));
+            let points = solve.places(ends);
             solve.problem.terms.springs.push(SpringTerm::new(ends, desc, points[0].distance(points[1])));
         }
-        for (id, joint) in &scene.potentials.ball_joints {
-            let Some((solve, ends)) = self.localise_anchors(scene, [joint.desc.a, joint.desc.b]) else { continue };
-            let stiffness = solver.joint_stiffness * solve.reduced_mass(ends) / (dt * dt);
-            solve.problem.terms.ball_joints.push(BallJointTerm::new(ends, stiffness, joint.force));
+        for (id, &Held { desc, memory }) in &scene.potentials.rods {
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let scale = solve.scale(ends, solve.places(ends), solver.joint_stiffness);
+            solve.problem.terms.rods.push(RodTerm::new(ends, desc.length, desc.tolerance, scale, memory));
+            solve.rods.push(id);
+        }
+        self.gather_own_rods(scene);
+        for (id, &Held { desc, memory }) in &scene.potentials.ball_joints {
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let scale = solve.scale(ends, solve.places(ends), solver.joint_stiffness);
+            solve.problem.terms.ball_joints.push(BallJointTerm::new(ends, desc.tolerance, scale, memory));
             solve.ball_joints.push(id);
         }
         for desc in scene.potentials.axles.values() {
@@ -211,6 +226,25 @@ impl Integrator {
             let Some((solve, [end, _])) = self.localise_anchors(scene, anchors) else { continue };
             let (mass, position) = (solve.mass(end), solve.start(end).position.into());
             solve.problem.terms.pds.push(PdTerm::new(end.frame, desc, *gains, mass, position, *dt));
+        }
+    }
+
+    /// The rods between points of figures: a point's block is its frame.
+    fn gather_own_rods(&mut self, scene: &Scene) {
+        for active in &self.active {
+            let body = &scene.bodies[active.id];
+            let Some(figure) = &body.figure else { continue };
+            let q = scene.state.q(body.slice);
+            let rods = (0u32..).zip(figure.dof.rods()).zip(&figure.rods);
+            for ((index, rod), &memory) in rods {
+                let places = rod.points.map(|point| self.islands.place(active.first + point));
+                let solve = &mut self.solves[places[0].island as usize];
+                let ends = places.map(|place| End { frame: place.index, point: DVec3::ZERO });
+                let points = rod.points.map(|point| DVec3::from_slice(&q[3 * point as usize..]));
+                let scale = solve.scale(ends, points, scene.settings.solver.joint_stiffness);
+                solve.problem.terms.own_rods.push(RodTerm::new(ends, rod.length, rod.tolerance, scale, memory));
+                solve.own_rods.push((active.id, index));
+            }
         }
     }
 
@@ -251,17 +285,34 @@ impl Solve {
 
     /// What resists a force at an end, kg; infinite for the world.
     fn mass(&self, end: End) -> f64 {
-        if let Some(node) = self.node(end.frame) {
-            return node.mass;
+        match self.problem.unknowns.get(end.frame as usize) {
+            Some(Unknown::Body(node)) => node.mass,
+            // The frame is a point.
+            Some(Unknown::Rates(rates)) => rates.masses[0],
+            None => {
+                let attachment = (end.frame as usize).checked_sub(self.problem.len());
+                let attachment = attachment.and_then(|k| self.problem.figures.attachments.get(k));
+                attachment.map_or(f64::INFINITY, |attachment| attachment.mass)
+            }
         }
-        let attachment = (end.frame as usize).checked_sub(self.problem.len());
-        let attachment = attachment.and_then(|k| self.problem.figures.attachments.get(k));
-        attachment.map_or(f64::INFINITY, |attachment| attachment.mass)
     }
 
     /// Reduced mass of two ends, kg; of the one that moves where the other is the world.
     fn reduced_mass(&self, [a, b]: [End; 2]) -> f64 {
         (self.mass(a).recip() + self.mass(b).recip()).recip()
+    }
+
+    /// What the stiffness of a joint between two ends is measured with; its points are at `places`.
+    fn scale(&self, ends: [End; 2], places: [DVec3; 2], least: f64) -> Scale {
+        let dt = self.problem.dt;
+        let reach = places[0].abs().max(places[1].abs()).max_element();
+        let (unit, strongest) = (self.reduced_mass(ends) / (dt * dt), self.mass * STRONGEST / (dt * dt));
+        Scale { unit, least, reach, strongest }
+    }
+
+    /// World positions of two ends at the start of the tick, m.
+    fn places(&self, ends: [End; 2]) -> [DVec3; 2] {
+        ends.map(|end| self.start(end).place(end.point))
     }
 
     /// From an end's origin to a contact point; none for what does not turn.

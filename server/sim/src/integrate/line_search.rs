@@ -21,11 +21,19 @@ impl Walk {
     /// For steps whose length the model of the method knows: never beyond.
     pub const NEWTON: Self = Self { shrink: 0.5, reach: 1.0, least: 0.05 };
 
+    /// The full step, whatever is there, unless that is not finite.
+    pub const FULL: Self = Self { shrink: f64::INFINITY, ..Self::NEWTON };
+
     /// For steps that know only their direction: their length may be wrong by orders of magnitude.
     pub const GRADIENT: Self = Self { shrink: 0.5, reach: 1e6, least: 1e-6 };
 
     /// For conjugate directions, which live on the last search having come close to the minimum.
     pub const CONJUGATE: Self = Self { shrink: 0.1, ..Self::GRADIENT };
+
+    /// Whether a walk from the directional derivative `start` would end at `end`.
+    pub fn ends_at(&self, start: f64, end: f64) -> bool {
+        end <= self.shrink * start.abs()
+    }
 }
 
 /// Finds α above 0. `slope_at` moves to u + α s and answers the directional derivative there; the last call it gets is
@@ -44,7 +52,7 @@ pub(super) fn search(start: f64, walk: Walk, mut slope_at: impl FnMut(f64) -> f6
         evaluations += 1;
     }
     // Falling still, or nearly flat: the model was not too bold.
-    if high.1 <= limit {
+    if walk.ends_at(start, high.1) {
         return high.0;
     }
     loop {
@@ -84,6 +92,13 @@ mod tests {
     #[test]
     fn a_quadratic_takes_the_full_step_at_once() {
         assert_eq!(searched(Walk::NEWTON, |a| 2.0 * (a - 1.0)), (1.0, 1));
+    }
+
+    #[test]
+    fn a_full_step_goes_through_walls_unless_they_are_not_finite() {
+        let wall = |a: f64| if a > 0.3 { 1e6 } else { -1.0 };
+        assert_eq!(searched(Walk::FULL, wall), (1.0, 1));
+        assert!(searched(Walk::FULL, |a| if a > 0.3 { f64::NAN } else { -1.0 }).0 < 1.0);
     }
 
     #[test]

@@ -51,6 +51,9 @@ pub struct StepReport {
     pub worst_penetration: f64,
     /// Widest gap of any joint at the end of the tick, m.
     pub worst_joint_gap: f64,
+    /// Joints and rods whose gap is above their tolerance at the end of the tick: overloaded beyond what stiffness can
+    /// hold, torn by an impact, or lengths that cannot agree.
+    pub open_joints: usize,
     /// Bodies that were quarantined in this tick because their state became non-finite.
     pub quarantined: usize,
 }

@@ -10,6 +10,7 @@ use crate::potential::axle::AxleTerm;
 use crate::potential::ball_joint::BallJointTerm;
 use crate::potential::contact::ContactTerm;
 use crate::potential::pd::PdTerm;
+use crate::potential::rod::RodTerm;
 use crate::potential::spring::SpringTerm;
 use crate::potential::{FIXED, FrameIndex, Term, Wrench};
 
@@ -41,6 +42,8 @@ macro_rules! terms {
 terms! {
     contacts: ContactTerm,
     springs: SpringTerm,
+    rods: RodTerm,
+    own_rods: RodTerm,
     ball_joints: BallJointTerm,
     axles: AxleTerm,
     pds: PdTerm,
@@ -263,6 +266,21 @@ impl Problem {
         terms.visit(&mut Propose { step, figures, dt: *dt });
     }
 
+    /// Whether there are potentials that hold something on an arc.
+    pub(super) fn bends(&mut self) -> bool {
+        let mut visitor = Bends(false);
+        self.terms.visit(&mut visitor);
+        visitor.0
+    }
+
+    /// Raises the stiffness of joints that are open although the candidate is nearly the solution. Answers whether there
+    /// was one: the solution is then another.
+    pub(super) fn stiffen(&mut self) -> bool {
+        let mut visitor = Stiffen { frames: &self.frames, any: false };
+        self.terms.visit(&mut visitor);
+        visitor.any
+    }
+
     /// Largest residual of any block in energy norm, as a speed of its body, m/s.
     pub(super) fn residual_speed<const D: usize>(&self, residual: &[Entry<D>]) -> f64 {
         let squared = self.unknowns.iter().zip(residual).map(|(unknown, r)| unknown.residual_speed_squared(r));
@@ -335,6 +353,27 @@ impl Visitor for Relinearise<'_> {
     fn visit<T: Term>(&mut self, terms: &mut [T]) {
         for term in terms {
             term.relinearise(self.dt, pair(self.frames, term));
+        }
+    }
+}
+
+struct Bends(bool);
+
+impl Visitor for Bends {
+    fn visit<T: Term>(&mut self, terms: &mut [T]) {
+        self.0 |= T::BENDS && !terms.is_empty();
+    }
+}
+
+struct Stiffen<'a> {
+    frames: &'a [Frame<f64>],
+    any: bool,
+}
+
+impl Visitor for Stiffen<'_> {
+    fn visit<T: Term>(&mut self, terms: &mut [T]) {
+        for term in terms {
+            self.any |= term.stiffen(pair(self.frames, term));
         }
     }
 }

@@ -12,7 +12,8 @@ use super::solver::{SolveReport, Solvers, StoppedBecause};
 use crate::collide::ContactPoint;
 use crate::dof::{Body, BodyId, Placed, Twist};
 use crate::island::Islands;
-use crate::potential::{BallJointId, Potentials};
+use crate::potential::hold::{Joint, Memory};
+use crate::potential::{BallJointId, Potentials, RodId};
 use crate::settings::Settings;
 use crate::state::State;
 
@@ -41,8 +42,13 @@ pub(super) struct Solve {
     /// Share of the tick's budget, block operations.
     budget: Option<u64>,
     report: SolveReport,
+    /// Of the island, kg.
+    pub mass: f64,
     /// Index of each contact term among the world's contacts.
     pub contacts: Vec<u32>,
+    pub rods: Vec<RodId>,
+    /// Body and index of each rod of a figure.
+    pub own_rods: Vec<(BodyId, u32)>,
     pub ball_joints: Vec<BallJointId>,
 }
 
@@ -139,7 +145,10 @@ impl Solve {
     /// Starts a tick with an island of no bodies.
     pub fn clear(&mut self, settings: &Settings) {
         self.problem.clear(settings.dt, settings.gravity);
+        self.mass = 0.0;
         self.contacts.clear();
+        self.rods.clear();
+        self.own_rods.clear();
         self.ball_joints.clear();
     }
 
@@ -152,9 +161,18 @@ impl Solve {
             contact.normal_force = finite_or_zero(DVec3::X * term.normal_force(dt, at)).x;
             report.worst_penetration = report.worst_penetration.max(term.final_depth(dt, at));
         }
+        let potentials = &mut *scene.potentials;
+        for (term, &id) in problem.terms.rods.iter().zip(&self.rods) {
+            potentials.rods[id].memory = account(problem, term, report);
+        }
         for (term, &id) in problem.terms.ball_joints.iter().zip(&self.ball_joints) {
-            scene.potentials.ball_joints[id].force = finite_or_zero(term.force);
-            report.worst_joint_gap = report.worst_joint_gap.max(term.gap(problem.pair(term)));
+            potentials.ball_joints[id].memory = account(problem, term, report);
+        }
+        for (term, &(body, rod)) in problem.terms.own_rods.iter().zip(&self.own_rods) {
+            let figure = scene.bodies[body].figure.as_mut();
+            if let Some(memory) = figure.and_then(|figure| figure.rods.get_mut(rod as usize)) {
+                *memory = account(problem, term, report);
+            }
         }
         for term in &problem.terms.axles {
             report.worst_joint_gap = report.worst_joint_gap.max(term.gap(problem.pair(term)));
@@ -180,6 +198,15 @@ fn share_budget(solves: &mut [Solve], budget: Option<u64>) {
         // No share is larger than the whole, so it fits.
         solve.budget = budget.map(|budget| (u128::from(budget) * size(solve) / all.max(1)) as u64);
     }
+}
+
+/// Counts a joint in; answers what it remembers.
+fn account(problem: &Problem, joint: &impl Joint, report: &mut StepReport) -> Memory {
+    let at = problem.pair(joint);
+    report.worst_joint_gap = report.worst_joint_gap.max(joint.gap(at));
+    report.open_joints += usize::from(joint.is_open(at));
+    let memory = joint.remember(at);
+    Memory { force: finite_or_zero(memory.force), ..memory }
 }
 
 /// What a potential remembers must not carry a non-finite number into the next tick.

@@ -8,7 +8,9 @@ pub(crate) mod axle;
 pub(crate) mod ball_joint;
 pub(crate) mod contact;
 pub mod elasticity;
+pub(crate) mod hold;
 pub(crate) mod pd;
+pub(crate) mod rod;
 pub(crate) mod spring;
 #[cfg(test)]
 mod tests;
@@ -20,8 +22,10 @@ use slotmap::SlotMap;
 
 pub use axle::{AxleControl, AxleDesc, AxleId, Motor};
 pub use ball_joint::{BallJointDesc, BallJointId};
+use hold::Held;
 pub(crate) use pd::PdGains;
 pub use pd::{PdControl, PdDesc, PdId};
+pub use rod::{RodDesc, RodId};
 pub use spring::{SpringDesc, SpringId};
 
 use crate::autodiff::{Dual, Scalar, Vec3};
@@ -60,16 +64,10 @@ impl Anchor {
 #[derive(Default)]
 pub(crate) struct Potentials {
     pub springs: SlotMap<SpringId, SpringDesc>,
-    pub ball_joints: SlotMap<BallJointId, BallJoint>,
+    pub rods: SlotMap<RodId, Held<RodDesc>>,
+    pub ball_joints: SlotMap<BallJointId, Held<BallJointDesc>>,
     pub axles: SlotMap<AxleId, AxleDesc>,
     pub pds: SlotMap<PdId, (PdDesc, PdGains)>,
-}
-
-/// A ball joint and what it remembers.
-pub(crate) struct BallJoint {
-    pub desc: BallJointDesc,
-    /// Force of the last tick, N.
-    pub force: DVec3,
 }
 
 impl Potentials {
@@ -77,16 +75,18 @@ impl Potentials {
     pub fn pairs(&self) -> impl Iterator<Item = [Anchor; 2]> + '_ {
         let centre = |body: BodyId| Anchor::body(body, DVec3::ZERO);
         let springs = self.springs.values().map(|s| [s.a, s.b]);
+        let rods = self.rods.values().map(|r| [r.desc.a, r.desc.b]);
         let ball_joints = self.ball_joints.values().map(|j| [j.desc.a, j.desc.b]);
         let axles = self.axles.values().map(move |a| [centre(a.chassis), centre(a.wheel)]);
         let pds = self.pds.values().map(move |(pd, _)| [centre(pd.body), Anchor::world(DVec3::ZERO)]);
-        springs.chain(ball_joints).chain(axles).chain(pds)
+        springs.chain(rods).chain(ball_joints).chain(axles).chain(pds)
     }
 
     /// Removes every potential of a body.
     pub fn remove_body(&mut self, body: BodyId) {
         let stays = |ends: [Option<BodyId>; 2]| !ends.contains(&Some(body));
         self.springs.retain(|_, s| stays([s.a.body, s.b.body]));
+        self.rods.retain(|_, r| stays([r.desc.a.body, r.desc.b.body]));
         self.ball_joints.retain(|_, j| stays([j.desc.a.body, j.desc.b.body]));
         self.axles.retain(|_, a| stays([Some(a.chassis), Some(a.wheel)]));
         self.pds.retain(|_, (pd, _)| pd.body != body);
@@ -162,6 +162,9 @@ pub(crate) struct PairBlocks {
 
 /// A potential between two frames of an island.
 pub(crate) trait Term {
+    /// Whether it holds something on an arc by a stiffness, so that straight steps run into it.
+    const BENDS: bool = false;
+
     /// The frames; either may be [`FIXED`].
     fn frames(&self) -> [FrameIndex; 2];
 
@@ -177,6 +180,12 @@ pub(crate) trait Term {
 
     /// Hears of the Newton step that the linear model proposes, as displacements of both frames, m and rad.
     fn propose(&mut self, _step: [Twist; 2]) {}
+
+    /// Raises a stiffness that the engine chose, where the candidate, which is nearly the solution, leaves a gap above
+    /// its tolerance. Answers whether it did.
+    fn stiffen(&mut self, _at: [&Frame<f64>; 2]) -> bool {
+        false
+    }
 }
 
 /// [r]×, the matrix of the cross product.

@@ -6,7 +6,9 @@ use proptest::prelude::*;
 use super::axle::AxleTerm;
 use super::ball_joint::BallJointTerm;
 use super::contact::ContactTerm;
+use super::hold::{Memory, Scale};
 use super::pd::PdTerm;
+use super::rod::RodTerm;
 use super::spring::SpringTerm;
 use super::*;
 use crate::autodiff::Dual;
@@ -15,6 +17,9 @@ use crate::dof::{Node, Pose};
 use crate::settings::ContactSettings;
 
 pub(super) const DT: f64 = 1.0 / 30.0;
+
+/// Joints with a stiffness of 1 kN/m.
+const SCALE: Scale = Scale { unit: 1.0, least: 1e3, reach: 0.0, strongest: 1e9 };
 
 /// The frame after a displacement of size `h` along its `i`th coordinate of six.
 fn moved(frame: &Frame<f64>, i: usize, h: f64) -> Frame<f64> {
@@ -178,8 +183,35 @@ proptest! {
     }
 
     #[test]
+    fn rod_derives(a in vector(), b in vector(), length in 0.1..3.0, t in frame(), u in frame()) {
+        prop_assume!((t.place(a) - u.place(b)).length() > 0.1);
+        let term = RodTerm::new(ends(a, b), length, 1e-3, SCALE, Memory::default());
+        check_gradient(&term, &[t, u]);
+        automatic_hessian(&term, &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn rod_of_the_right_length_has_the_exact_hessian(a in vector(), b in vector(), t in frame(), u in frame()) {
+        let length = (t.place(a) - u.place(b)).length();
+        prop_assume!(length > 0.1);
+        let mut term = RodTerm::new(ends(a, b), length, 1e-3, SCALE, Memory::default());
+        term.relinearise(DT, [&t, &u]);
+        check_hessian(&term, &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn stretched_rod_between_points_has_the_exact_hessian(length in 0.1..0.9, t in frame(), u in frame()) {
+        let distance = DVec3::from(t.position - u.position).length();
+        prop_assume!(distance > 0.1);
+        let mut term = RodTerm::new(ends(DVec3::ZERO, DVec3::ZERO), distance * length, 1e-3, SCALE, Memory::default());
+        term.relinearise(DT, [&t, &u]);
+        term.propose([Twist::REST; 2]);
+        check_hessian(&term, &[t, u], 1e-5);
+    }
+
+    #[test]
     fn ball_joint_derives(a in vector(), b in vector(), t in frame(), u in frame()) {
-        let term = BallJointTerm::new(ends(a, b), 1e3, DVec3::ZERO);
+        let term = BallJointTerm::new(ends(a, b), 1e-3, SCALE, Memory::default());
         check_gradient(&term, &[t, u]);
         automatic_hessian(&term, &[t, u], 1e-5);
     }
@@ -187,7 +219,7 @@ proptest! {
     #[test]
     fn closed_ball_joint_has_the_exact_hessian(a in vector(), b in vector(), t in frame(), mut u in frame()) {
         u.position = t.position + t.arm(a) - u.arm(b);
-        let mut term = BallJointTerm::new(ends(a, b), 1e3, DVec3::ZERO);
+        let mut term = BallJointTerm::new(ends(a, b), 1e-3, SCALE, Memory::default());
         term.relinearise(DT, [&t, &u]);
         check_hessian(&term, &[t, u], 1e-5);
     }

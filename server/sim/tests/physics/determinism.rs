@@ -16,7 +16,7 @@ fn heaps(threads: usize) -> World {
             if i == 9 {
                 let ball = body(&mut world, Shape::Ball { radius: 0.2 }, 5.0, position + DVec3::Z * 1.5, 0.5);
                 let (a, b) = (Anchor::body(cube, DVec3::Z * 0.75), Anchor::body(ball, DVec3::Z * -0.75));
-                world.add_ball_joint(BallJointDesc { a, b }).unwrap();
+                world.add_ball_joint(BallJointDesc::new(a, b)).unwrap();
             }
         }
     }

@@ -51,7 +51,7 @@ fn joints_to_nothing_are_refused() {
     let mut world = world();
     let (a, b) = (cube(&mut world, DVec3::ZERO), cube(&mut world, DVec3::X * 2.0));
     let p = particle(&mut world, DVec3::Y, DVec3::ZERO, 1.0);
-    let joint = |a, b| BallJointDesc { a: Anchor::body(a, DVec3::ZERO), b: Anchor::body(b, DVec3::X) };
+    let joint = |a, b| BallJointDesc::new(Anchor::body(a, DVec3::ZERO), Anchor::body(b, DVec3::X));
     refused(world.add_ball_joint(joint(a, a)), "both ends are at the same body");
     refused(world.add_ball_joint(joint(a, p)), "a particle has no point but its own");
     let ends = (Anchor::world(DVec3::ZERO), Anchor::world(DVec3::X));
@@ -141,7 +141,7 @@ fn deep_overlap_is_reported_in_full() {
 fn removed_joints_let_bodies_collide_again() {
     let mut world = world();
     let (a, b) = (cube(&mut world, DVec3::ZERO), cube(&mut world, DVec3::X));
-    let desc = BallJointDesc { a: Anchor::body(a, DVec3::X * 0.5), b: Anchor::body(b, DVec3::X * -0.5) };
+    let desc = BallJointDesc::new(Anchor::body(a, DVec3::X * 0.5), Anchor::body(b, DVec3::X * -0.5));
     let joints = [world.add_ball_joint(desc).unwrap(), world.add_ball_joint(desc).unwrap()];
     for (left, expected) in [(joints[0], false), (joints[1], true)] {
         assert!(world.remove_ball_joint(left));

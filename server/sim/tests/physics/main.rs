@@ -8,6 +8,7 @@ mod hostile;
 mod joints;
 mod own_kind;
 mod solvers;
+mod tolerance;
 
 use pita_sim::{BodyId, Collider, DQuat, DVec3, ParticleDesc, RigidBodyDesc, Settings, Shape, StaticDesc, World};
 

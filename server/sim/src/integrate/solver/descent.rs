@@ -1,11 +1,12 @@
 //! What all methods share: guess, ask for a direction, walk along it, until there is a reason to stop.
 
 use super::super::block::Entry;
-use super::super::line_search;
+use super::super::line_search::{self, Walk};
 use super::super::matrix::Matrix;
 use super::super::problem::Problem;
 use super::super::vector::{add_scaled, inner};
 use super::guess::guess;
+use super::watchdog::{Standing, Verdict, Watchdog};
 use super::work::Work;
 use super::{SolveReport, Solver, Standpoint, StoppedBecause};
 use crate::settings::SolverSettings;
@@ -19,6 +20,10 @@ const VECTORS_AN_ITERATION: u64 = 2;
 /// Passes over vectors in each step of a line search: copy, add, product.
 const VECTORS_A_TRIAL: u64 = 3;
 
+/// Most times that open joints of an island are stiffened in a tick: in 5, a link of a gram comes to hold ten tonnes
+/// that it meets for the first time.
+const STIFFENING_ROUNDS: usize = 6;
+
 /// The state of a solve, kept from solve to solve for its memory.
 #[derive(Default)]
 pub(super) struct Descent<const D: usize> {
@@ -28,12 +33,22 @@ pub(super) struct Descent<const D: usize> {
     residual: Vec<Entry<D>>,
     step: Vec<Entry<D>>,
     best: Best<D>,
+    watchdog: Watchdog<D>,
     matrix: Matrix<D>,
 }
 
 /// Merits that differ by less than this share of what has been gained since the start are alike, and the residual
 /// decides: friction's limits, which every iteration takes anew, move the merit too.
 const ALIKE: f64 = 0.01;
+
+/// When to stop.
+#[derive(Clone, Copy)]
+struct Goal {
+    /// m/s.
+    residual: f64,
+    /// Most iterations.
+    iterations: usize,
+}
 
 /// The best state so far.
 #[derive(Default)]
@@ -67,6 +82,12 @@ impl<const D: usize> Best<D> {
     }
 }
 
+impl SolveReport {
+    fn standing(&self) -> Standing {
+        Standing { merit: self.merit, residual: self.residual }
+    }
+}
+
 impl<const D: usize> Descent<D> {
     /// Moves `problem`'s trial to the end of the tick by the method's directions. `budget` is exceeded by one iteration
     /// at most, and by what the start takes.
@@ -81,9 +102,23 @@ impl<const D: usize> Descent<D> {
         let mut report = SolveReport::default();
         guess(problem, settings, &mut work, &mut self.u, &mut self.start, &mut self.residual);
         self.best.forget();
+        self.watchdog.begin(method.walk() == Walk::NEWTON && problem.bends());
+        let mut goal = Goal { residual: settings.tolerance * problem.dt, iterations: settings.iterations() };
+        let mut rounds = 0;
         loop {
             self.relinearise(problem, &mut work, &mut report);
-            if let Some(reason) = self.reason_to_stop(problem.dt, settings, &work, &report) {
+            if self.watchdog.judge(report.standing()) == Verdict::GoBack {
+                self.walk_again(method, problem, &mut work);
+                self.relinearise(problem, &mut work, &mut report);
+            }
+            if let Some(reason) = self.reason_to_stop(goal, &work, &report) {
+                let solved = reason == StoppedBecause::Tolerance;
+                if solved && rounds < STIFFENING_ROUNDS && problem.stiffen() {
+                    goal.iterations = report.iterations + settings.iterations();
+                    rounds += 1;
+                    self.best.forget();
+                    continue;
+                }
                 report.stopped_because = reason;
                 break;
             }
@@ -93,12 +128,12 @@ impl<const D: usize> Descent<D> {
             let at = Standpoint { problem, u, residual, matrix, settings, work: &mut work, iteration };
             report.linear_iterations += method.direction(at, step);
             report.iterations += 1;
-            let moved = self.walk(method, problem, &mut work);
+            let moved = self.walk(method, problem, &mut work, report.standing());
             work.iteration_took(work.multiply_adds() - before);
             if !moved {
                 self.relinearise(problem, &mut work, &mut report);
                 report.stopped_because =
-                    self.reason_to_stop(problem.dt, settings, &work, &report).unwrap_or(StoppedBecause::Stagnation);
+                    self.reason_to_stop(goal, &work, &report).unwrap_or(StoppedBecause::Stagnation);
                 break;
             }
         }
@@ -117,37 +152,65 @@ impl<const D: usize> Descent<D> {
         self.best.offer(&self.u, report.merit, report.residual);
     }
 
-    fn reason_to_stop(
-        &self,
-        dt: f64,
-        settings: &SolverSettings,
-        work: &Work,
-        report: &SolveReport,
-    ) -> Option<StoppedBecause> {
+    fn reason_to_stop(&self, goal: Goal, work: &Work, report: &SolveReport) -> Option<StoppedBecause> {
         if !report.residual.is_finite() {
             return Some(StoppedBecause::NonFinite);
         }
-        if report.residual <= settings.tolerance * dt {
+        if report.residual <= goal.residual {
             return Some(StoppedBecause::Tolerance);
         }
-        if report.iterations >= settings.iterations() {
+        if report.iterations >= goal.iterations {
             return Some(StoppedBecause::IterationLimit);
         }
         (!work.affords_iteration()).then_some(StoppedBecause::Budget)
     }
 
-    /// Walks along the step; leaves `u` and the trial where it ends. Answers whether that is elsewhere.
-    fn walk(&mut self, method: &mut dyn Solver<D>, problem: &mut Problem, work: &mut Work) -> bool {
-        let Self { u, start, residual, step, .. } = self;
-        let slope = inner(residual, step);
+    /// Walks along the step from a state that is as good as `standing`; leaves `u` and the trial where it ends. Answers
+    /// whether that is elsewhere.
+    fn walk(&mut self, method: &mut dyn Solver<D>, problem: &mut Problem, work: &mut Work, standing: Standing) -> bool {
+        let slope = inner(&self.residual, &self.step);
         let descends = slope < 0.0;
         if !descends {
             return false;
         }
+        let bold = self.watchdog.is_bold();
+        let walk = if bold { Walk::FULL } else { method.walk() };
+        self.search(method, problem, work, walk);
+        if bold && !method.walk().ends_at(slope, inner(&self.residual, &self.step)) {
+            self.watchdog.overstepped(&self.start, standing, &self.step, slope);
+        }
+        let Self { u, start, .. } = self;
+        let largest = u.as_flattened().iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+        u.as_flattened().iter().zip(start.as_flattened()).any(|(now, before)| {
+            let still = (now - before).abs() <= STANDSTILL * largest;
+            !still
+        })
+    }
+
+    /// Goes back to where the watchdog's trial began, and from there no farther than the line search says.
+    fn walk_again(&mut self, method: &mut dyn Solver<D>, problem: &mut Problem, work: &mut Work) {
+        let (u, step) = self.watchdog.go_back();
+        self.u.clear();
+        self.u.extend_from_slice(u);
+        self.step.clear();
+        self.step.extend_from_slice(step);
+        problem.move_to(&self.u);
+        problem.relinearise();
+        problem.evaluate(&mut self.residual);
+        work.told_potentials();
+        work.moved_and_evaluated();
+        let walk = method.walk();
+        self.search(method, problem, work, walk);
+    }
+
+    /// Searches along the step; leaves `u`, the trial and the residual where that ends.
+    fn search(&mut self, method: &mut dyn Solver<D>, problem: &mut Problem, work: &mut Work, walk: Walk) {
+        let Self { u, start, residual, step, .. } = self;
+        let slope = inner(residual, step);
         problem.propose(step);
         work.told_potentials();
         start.clone_from(u);
-        let alpha = line_search::search(slope, method.walk(), |alpha| {
+        let alpha = line_search::search(slope, walk, |alpha| {
             u.clone_from(start);
             add_scaled(u, alpha, step);
             problem.move_to(u);
@@ -157,11 +220,6 @@ impl<const D: usize> Descent<D> {
             inner(residual, step)
         });
         method.walked(alpha, step, residual);
-        let largest = u.as_flattened().iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
-        u.as_flattened().iter().zip(start.as_flattened()).any(|(now, before)| {
-            let still = (now - before).abs() <= STANDSTILL * largest;
-            !still
-        })
     }
 
     /// One body's overflow must not spread over its island, nor a last step that went wrong.

@@ -20,6 +20,7 @@ mod step_length;
 #[cfg(test)]
 mod tests;
 mod truncated_newton;
+mod watchdog;
 pub(super) mod work;
 
 use self::descent::Descent;

@@ -1,6 +1,8 @@
 //! The world: bodies, potentials and static geometry under generational handles, and the two stages of the pipeline that
 //! are the engine's.
 
+mod potentials;
+
 use glam::{DQuat, DVec3};
 use slotmap::SlotMap;
 
@@ -11,10 +13,7 @@ use crate::dof::{
 };
 use crate::error::{SimError, require, require_rotation, require_vector};
 use crate::integrate::{Integrator, Scene, StepReport};
-use crate::potential::{
-    Anchor, AxleControl, AxleDesc, AxleId, BallJoint, BallJointDesc, BallJointId, PdControl, PdDesc, PdGains, PdId,
-    Potentials, SpringDesc, SpringId,
-};
+use crate::potential::{Anchor, Potentials};
 use crate::settings::Settings;
 use crate::state::State;
 
@@ -215,128 +214,6 @@ impl World {
     /// Removes a piece of static geometry. Answers whether there was one.
     pub fn remove_static(&mut self, id: StaticId) -> bool {
         self.detector.remove_static(id)
-    }
-
-    // --- potentials ------------------------------------------------------------------------------------------------
-
-    /// Adds a spring with a damper.
-    ///
-    /// # Errors
-    /// [`SimError`] for a value out of range, a body that is gone, or two ends at the same body.
-    pub fn add_spring(&mut self, desc: SpringDesc) -> Result<SpringId, SimError> {
-        desc.validate()?;
-        self.check_anchors(desc.a, desc.b)?;
-        Ok(self.potentials.springs.insert(desc))
-    }
-
-    /// Adds a ball joint.
-    ///
-    /// # Errors
-    /// As [`World::add_spring`].
-    pub fn add_ball_joint(&mut self, desc: BallJointDesc) -> Result<BallJointId, SimError> {
-        desc.validate()?;
-        self.check_anchors(desc.a, desc.b)?;
-        if let (Some(a), Some(b)) = (desc.a.body, desc.b.body) {
-            self.detector.exclude(self.bodies[a].serial, self.bodies[b].serial);
-        }
-        Ok(self.potentials.ball_joints.insert(BallJoint { desc, force: DVec3::ZERO }))
-    }
-
-    /// Adds an axle between two rigid bodies.
-    ///
-    /// # Errors
-    /// As [`World::add_spring`].
-    pub fn add_axle(&mut self, desc: AxleDesc) -> Result<AxleId, SimError> {
-        desc.validate()?;
-        let bodies = [desc.chassis, desc.wheel].map(|id| self.bodies.get(id));
-        let [Some(chassis), Some(wheel)] = bodies else { return Err(SimError::Gone { what: "a body of the axle" }) };
-        if chassis.kind != DofKind::RigidBody || wheel.kind != DofKind::RigidBody || desc.chassis == desc.wheel {
-            return Err(SimError::Unusable { what: "an axle needs two different rigid bodies" });
-        }
-        self.detector.exclude(chassis.serial, wheel.serial);
-        Ok(self.potentials.axles.insert(desc))
-    }
-
-    /// Adds a PD controller.
-    ///
-    /// # Errors
-    /// [`SimError`] for a value out of range, for what this tick rate cannot show, or a body that is gone.
-    pub fn add_pd(&mut self, desc: PdDesc) -> Result<PdId, SimError> {
-        desc.control.validate()?;
-        let positive = desc.max_force > 0.0;
-        if !positive {
-            return Err(SimError::OutOfRange { what: "max_force", value: desc.max_force, allowed: "above 0 N" });
-        }
-        let gains = PdGains::new(desc.frequency, desc.damping_ratio, self.settings.dt)?;
-        if !self.bodies.contains_key(desc.body) {
-            return Err(SimError::Gone { what: "the body of the controller" });
-        }
-        Ok(self.potentials.pds.insert((desc, gains)))
-    }
-
-    /// Removes a spring. Answers whether there was one.
-    pub fn remove_spring(&mut self, id: SpringId) -> bool {
-        self.potentials.springs.remove(id).is_some()
-    }
-
-    /// Removes a ball joint. Answers whether there was one.
-    pub fn remove_ball_joint(&mut self, id: BallJointId) -> bool {
-        let Some(joint) = self.potentials.ball_joints.remove(id) else { return false };
-        if let (Some(a), Some(b)) = (joint.desc.a.body, joint.desc.b.body) {
-            self.detector.include(self.bodies[a].serial, self.bodies[b].serial);
-        }
-        true
-    }
-
-    /// Removes a controller. Answers whether there was one.
-    pub fn remove_pd(&mut self, id: PdId) -> bool {
-        self.potentials.pds.remove(id).is_some()
-    }
-
-    /// What a driver does to a wheel now.
-    pub fn axle(&self, id: AxleId) -> Option<&AxleControl> {
-        self.potentials.axles.get(id).map(|axle| &axle.control)
-    }
-
-    /// Steers, drives and brakes a wheel from the coming tick on.
-    ///
-    /// # Errors
-    /// [`SimError`] for a value out of range, or an axle that is gone.
-    pub fn set_axle(&mut self, id: AxleId, control: AxleControl) -> Result<(), SimError> {
-        control.validate()?;
-        self.potentials.axles.get_mut(id).ok_or(SimError::Gone { what: "the axle" })?.control = control;
-        Ok(())
-    }
-
-    /// Moves a controller's target.
-    ///
-    /// # Errors
-    /// [`SimError`] for a value out of range, or a controller that is gone.
-    pub fn set_pd(&mut self, id: PdId, control: PdControl) -> Result<(), SimError> {
-        control.validate()?;
-        self.potentials.pds.get_mut(id).ok_or(SimError::Gone { what: "the controller" })?.0.control = control;
-        Ok(())
-    }
-
-    fn check_anchors(&self, a: Anchor, b: Anchor) -> Result<(), SimError> {
-        for anchor in [a, b] {
-            let Some(id) = anchor.body else { continue };
-            let body = self.bodies.get(id).ok_or(SimError::Gone { what: "a body of the potential" })?;
-            if body.kind == DofKind::Particle && anchor.point != DVec3::ZERO {
-                return Err(SimError::Unusable { what: "a particle has no point but its own: use 0, 0, 0" });
-            }
-            let parts = body.figure.as_ref().map_or(1, |figure| figure.dof.parts());
-            require(
-                anchor.part < parts,
-                "part of an anchor",
-                f64::from(anchor.part),
-                "the index of one of the body's parts",
-            )?;
-        }
-        if a.body == b.body {
-            return Err(SimError::Unusable { what: "both ends are at the same body" });
-        }
-        Ok(())
     }
 
     // --- state -----------------------------------------------------------------------------------------------------
