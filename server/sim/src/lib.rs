@@ -31,7 +31,9 @@ mod state;
 mod world;
 
 pub use collide::{Collider, ContactView, Shape, StaticDesc, StaticId};
-pub use dof::articulated::{Articulated, JointDesc, JointKind, PartDesc};
+pub use dof::articulated::{
+    Articulated, JointDesc, JointDrive, JointKind, JointLimit, JointMotor, JointSpring, LimitRange, PartDesc,
+};
 pub use dof::{BodyId, Dof, DofKind, FigureDesc, Frame, PartCollider, PartPoint, ParticleDesc, RigidBodyDesc};
 pub use error::SimError;
 pub use glam::{DMat3, DQuat, DVec3};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::interface::{BLOCK_RATES_MAX, Dof, Inertia, PartPoint};
+use super::interface::{BLOCK_RATES_MAX, Dof, Inertia, LocalState, PartPoint};
 use super::{Motion, Pose};
 use crate::collide::Collider;
 use crate::error::{LARGEST, SimError, require};
@@ -37,6 +37,8 @@ pub struct PartCollider {
 pub(crate) struct FigureBody {
     pub dof: Arc<dyn Dof>,
     pub colliders: Vec<PartCollider>,
+    /// What steers it.
+    pub controls: Vec<f64>,
     /// Change of the rates in the last tick.
     pub change: Vec<f64>,
     /// What resists each rate at the start, kg or kg m².
@@ -56,7 +58,7 @@ impl std::fmt::Debug for FigureBody {
 impl FigureDesc {
     /// # Errors
     /// [`SimError`] naming what is wrong.
-    pub(crate) fn validate(&self) -> Result<(), SimError> {
+    pub(crate) fn validate(&self, dt: f64) -> Result<(), SimError> {
         let blocks = self.dof.blocks();
         let fits = blocks.iter().all(|b| (1..=BLOCK_RATES_MAX).contains(&usize::from(b.rates)));
         if blocks.is_empty() || !fits {
@@ -70,6 +72,7 @@ impl FigureDesc {
             numbers.iter().try_for_each(|&x| require(x.abs() < LARGEST, what, x, "finite and below 1e9"))?;
         }
         self.dof.check(&self.q, &self.v)?;
+        self.dof.check_controls(&self.dof.controls(), dt)?;
         if let Inertia::Points(masses) = self.dof.inertia() {
             let points =
                 blocks.iter().all(|b| (b.positions, b.rates) == (3, 3)) && masses.diagonal.len() == blocks.len();
@@ -95,14 +98,23 @@ impl FigureBody {
             Inertia::Points(masses) => masses.total(),
         };
         let masses = masses(&*desc.dof, &desc.q);
-        let (change, rods) = (vec![0.0; desc.v.len()], vec![Memory::default(); desc.dof.rods().len()]);
-        Self { change, masses, mass, rods, dof: desc.dof, colliders: desc.colliders }
+        let (controls, change) = (desc.dof.controls(), vec![0.0; desc.v.len()]);
+        let rods = vec![Memory::default(); desc.dof.rods().len()];
+        Self { controls, change, masses, mass, rods, dof: desc.dof, colliders: desc.colliders }
     }
 
     /// Pose of the frame at a material point.
     pub fn pose(&self, at: PartPoint, q: &[f64], v: &[f64]) -> Pose {
         let frame = self.dof.frame(at, q, v);
         Pose { position: frame.position.into(), rotation: DQuat::from_mat3(&frame.rotation.value()).normalize() }
+    }
+
+    /// Energy that its own potentials hold, J.
+    pub fn stored_energy(&self, q: &[f64], v: &[f64], dt: f64) -> f64 {
+        let mut prepared = Vec::new();
+        let at = LocalState { dt, q0: q, v0: v, q1: q, v1: v, controls: &self.controls, prepared: &[] };
+        self.dof.prepare(&at, &mut prepared);
+        self.dof.stored_energy(&LocalState { prepared: &prepared, ..at })
     }
 
     pub fn motion(&self, q: &[f64], v: &[f64]) -> Motion {

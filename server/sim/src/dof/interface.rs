@@ -99,6 +99,10 @@ pub struct LocalState<'a> {
     pub q1: &'a [f64],
     /// Rates at the candidate.
     pub v1: &'a [f64],
+    /// What steers it from outside: [`Dof::controls`], or what was set since.
+    pub controls: &'a [f64],
+    /// What [`Dof::prepare`] found for this tick.
+    pub prepared: &'a [f64],
 }
 
 /// A kind of DOF with everything about one body of that kind that does not change.
@@ -160,13 +164,34 @@ pub trait Dof: Send + Sync {
         &[]
     }
 
-    /// Energy of its own potentials at the candidate, J. Adds the derivative with respect to each rate's displacement
+    /// Numbers that steer it from outside, such as the targets of motors, as they are at first.
+    fn controls(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// What is wrong with such numbers in a world of ticks of `dt` seconds. They are finite and as many as at first.
+    ///
+    /// # Errors
+    /// [`SimError`] naming the item.
+    fn check_controls(&self, _controls: &[f64], _dt: f64) -> Result<(), SimError> {
+        Ok(())
+    }
+
+    /// Appends to `prepared` what its potentials need all through a tick. The candidate is still the start.
+    fn prepare(&self, _at: &LocalState, _prepared: &mut Vec<f64>) {}
+
+    /// Energy of its own potentials at the candidate, J, damping and motors included. Adds the derivative with respect to each rate's displacement
     /// (rate × dt) to `gradient`.
     fn energy(&self, _at: &LocalState, _gradient: &mut [f64]) -> f64 {
         0.0
     }
 
-    /// Hands `add` the positive semidefinite second derivative of that energy: (row block, column block, entries) for
+    /// Energy that its own potentials hold at the candidate and could give back, J.
+    fn stored_energy(&self, at: &LocalState) -> f64 {
+        self.energy(at, &mut vec![0.0; at.v1.len()])
+    }
+
+    /// Hands `add` the positive semidefinite second derivative of [`Dof::energy`]: (row block, column block, entries) for
     /// the diagonal and the pairs with row > column.
     fn stiffness(&self, _at: &LocalState, _add: &mut dyn FnMut(usize, usize, &RateBlock)) {}
 

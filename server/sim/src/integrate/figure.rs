@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::block::{Block, Entry};
-use crate::dof::{Columns, Dof, Frame, Inertia, LocalState, PartInertia, PartLoad, PartPoint, Twist};
+use crate::dof::{Columns, Dof, FigureBody, Frame, Inertia, LocalState, PartInertia, PartLoad, PartPoint, Twist};
 use crate::potential::Wrench;
 
 /// A body of a general kind in an island.
@@ -21,6 +21,8 @@ pub(crate) struct Figure {
     pub v0: Vec<f64>,
     pub q1: Vec<f64>,
     pub v1: Vec<f64>,
+    controls: Vec<f64>,
+    prepared: Vec<f64>,
     gradient: Vec<f64>,
     /// The parts' centres of mass among the attachments; empty where points carry the mass.
     parts: Range<u32>,
@@ -78,13 +80,14 @@ impl Figures {
     }
 
     /// Adds a figure with blocks at `blocks`. Answers its index.
-    pub fn add(&mut self, dof: &Arc<dyn Dof>, blocks: impl Iterator<Item = u32>, q: &[f64], v: &[f64]) -> u32 {
+    pub fn add(&mut self, body: &FigureBody, blocks: impl Iterator<Item = u32>, [q, v]: [&[f64]; 2], dt: f64) -> u32 {
         if self.used == self.list.len() {
-            self.list.push(Figure::new(dof));
+            self.list.push(Figure::new(&body.dof));
         }
         let figure = &mut self.list[self.used];
-        figure.dof = Arc::clone(dof);
-        figure.start(blocks, q, v);
+        figure.dof = Arc::clone(&body.dof);
+        figure.start(blocks, [q, v], &body.controls);
+        figure.prepare(dt);
         self.used += 1;
         self.used as u32 - 1
     }
@@ -242,6 +245,8 @@ impl Figure {
             v0: Vec::new(),
             q1: Vec::new(),
             v1: Vec::new(),
+            controls: Vec::new(),
+            prepared: Vec::new(),
             gradient: Vec::new(),
             parts: 0..0,
             free_momenta: Vec::new(),
@@ -250,7 +255,7 @@ impl Figure {
         }
     }
 
-    fn start(&mut self, blocks: impl Iterator<Item = u32>, q: &[f64], v: &[f64]) {
+    fn start(&mut self, blocks: impl Iterator<Item = u32>, [q, v]: [&[f64]; 2], controls: &[f64]) {
         self.blocks.clear();
         self.blocks.extend(blocks);
         self.offsets.clear();
@@ -259,10 +264,18 @@ impl Figure {
             self.offsets.push(offset);
             offset += u32::from(size.rates);
         }
-        for (mine, theirs) in [(&mut self.q0, q), (&mut self.q1, q), (&mut self.v0, v), (&mut self.v1, v)] {
+        let state = [(&mut self.q0, q), (&mut self.q1, q), (&mut self.v0, v), (&mut self.v1, v)];
+        for (mine, theirs) in state.into_iter().chain([(&mut self.controls, controls)]) {
             mine.clear();
             mine.extend_from_slice(theirs);
         }
+    }
+
+    fn prepare(&mut self, dt: f64) {
+        let mut prepared = std::mem::take(&mut self.prepared);
+        prepared.clear();
+        self.dof.prepare(&self.local_state(dt), &mut prepared);
+        self.prepared = prepared;
     }
 
     /// Island index and own rates of each block.
@@ -284,7 +297,8 @@ impl Figure {
     }
 
     fn local_state(&self, dt: f64) -> LocalState<'_> {
-        LocalState { dt, q0: &self.q0, v0: &self.v0, q1: &self.q1, v1: &self.v1 }
+        let Self { q0, v0, q1, v1, controls, prepared, .. } = self;
+        LocalState { dt, q0, v0, q1, v1, controls, prepared }
     }
 
     fn move_to<const D: usize>(&mut self, u: &[Entry<D>], dt: f64, frames: &mut [Frame<f64>]) {

@@ -128,11 +128,13 @@ impl Integrator {
         let Settings { dt, gravity, .. } = *scene.settings;
         for active in &mut self.active {
             let body = &scene.bodies[active.id];
-            let Some(FigureBody { dof, .. }) = &body.figure else { continue };
+            let Some(figure) = &body.figure else { continue };
             let island = self.islands.place(active.first).island;
             let figures = &mut self.solves[island as usize].problem.figures;
-            let blocks = (active.first..).take(dof.blocks().len()).map(|block| self.islands.place(block).index);
-            active.figure = figures.add(dof, blocks, scene.state.q(body.slice), scene.state.v(body.slice));
+            let blocks = (active.first..).take(figure.dof.blocks().len());
+            let blocks = blocks.map(|block| self.islands.place(block).index);
+            let state = [scene.state.q(body.slice), scene.state.v(body.slice)];
+            active.figure = figures.add(figure, blocks, state, dt);
             figures.attach_parts(active.figure, dt, gravity);
         }
     }

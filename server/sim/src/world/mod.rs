@@ -8,8 +8,8 @@ use slotmap::SlotMap;
 
 use crate::collide::{Collider, ContactView, Detector, Moving, Partner, StaticDesc, StaticId};
 use crate::dof::{
-    self, ABSENT, Body, BodyId, DofKind, FigureBody, FigureDesc, Frame, LocalState, PartPoint, ParticleDesc, Placed,
-    Pose, RigidBodyDesc, Twist, particle, rigid_body,
+    self, ABSENT, Body, BodyId, DofKind, FigureBody, FigureDesc, Frame, PartPoint, ParticleDesc, Placed, Pose,
+    RigidBodyDesc, Twist, particle, rigid_body,
 };
 use crate::error::{SimError, require, require_rotation, require_vector};
 use crate::integrate::{Integrator, Scene, StepReport};
@@ -134,7 +134,7 @@ impl World {
     /// # Errors
     /// [`SimError`] naming the value that is out of range.
     pub fn add_figure(&mut self, desc: FigureDesc) -> Result<BodyId, SimError> {
-        desc.validate()?;
+        desc.validate(self.settings.dt)?;
         let rates = desc.v.len() as u32;
         let (kind, q, v) = (desc.dof.kind(), desc.q.clone(), desc.v.clone());
         let figure = FigureBody::new(desc);
@@ -348,6 +348,26 @@ impl World {
         Ok(())
     }
 
+    /// What steers a body of a general kind, as its kind orders it; none for other bodies.
+    pub fn controls(&self, id: BodyId) -> Option<&[f64]> {
+        Some(self.bodies.get(id)?.figure.as_ref().map_or(&[], |figure| &figure.controls))
+    }
+
+    /// Steers a body of a general kind from the coming tick on.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, numbers that are too many or too few, or a body that is gone.
+    pub fn set_controls(&mut self, id: BodyId, controls: &[f64]) -> Result<(), SimError> {
+        let body = self.bodies.get_mut(id).ok_or(SimError::Gone { what: "the body" })?;
+        let Some(figure) = body.figure.as_mut().filter(|figure| figure.controls.len() == controls.len()) else {
+            return Err(SimError::Unusable { what: "controls must be as many as the body has" });
+        };
+        controls.iter().try_for_each(|&x| require(!x.is_nan(), "control", x, "a number"))?;
+        figure.dof.check_controls(controls, self.settings.dt)?;
+        figure.controls.copy_from_slice(controls);
+        Ok(())
+    }
+
     /// Number of bodies.
     pub fn body_count(&self) -> usize {
         self.order.len()
@@ -377,8 +397,7 @@ impl World {
             energy.gravitational -= self.settings.gravity.dot(motion.moment);
             if let Some(figure) = &body.figure {
                 let (q, v) = (self.state.q(body.slice), self.state.v(body.slice));
-                let state = LocalState { dt: self.settings.dt, q0: q, v0: v, q1: q, v1: v };
-                energy.elastic += figure.dof.energy(&state, &mut vec![0.0; v.len()]);
+                energy.elastic += figure.stored_energy(q, v, self.settings.dt);
             }
         }
         for spring in self.potentials.springs.values() {

@@ -3,13 +3,15 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::joint::{Joint, JointKind};
+use super::limit::JointLimit;
+use super::motor::{JointMotor, JointSpring};
 use crate::dof::PartInertia;
 use crate::eigen::symmetric_eigen;
 use crate::error::{LARGEST, SimError, require, require_rotation, require_vector};
 use crate::mass::MassProperties;
 
 /// Most parts of a figure: the work of a tick grows with the square of the depth of the tree.
-pub const PARTS_MAX: usize = 256;
+pub const PARTS_MAX: usize = 64;
 
 /// Sine of the smallest angle between the axes of a universal joint.
 const UNIVERSAL_ANGLE_MIN: f64 = 0.1;
@@ -28,7 +30,7 @@ pub struct PartDesc {
 }
 
 /// A joint between a part and its parent.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct JointDesc {
     /// Which movements it leaves.
     pub kind: JointKind,
@@ -39,12 +41,19 @@ pub struct JointDesc {
     pub in_part: DVec3,
     /// Turns the part's axes into its parent's at rest.
     pub rest: DQuat,
+    /// What keeps it within a range.
+    pub limits: Vec<JointLimit>,
+    /// What pulls it to rest.
+    pub spring: Option<JointSpring>,
+    /// What drives it.
+    pub motor: Option<JointMotor>,
 }
 
 impl JointDesc {
-    /// A joint at both origins that leaves the axes parallel at rest.
+    /// A joint at both origins that leaves the axes parallel at rest, and on which nothing acts.
     pub fn new(kind: JointKind) -> Self {
-        Self { kind, in_parent: DVec3::ZERO, in_part: DVec3::ZERO, rest: DQuat::IDENTITY }
+        let (in_parent, in_part, rest) = (DVec3::ZERO, DVec3::ZERO, DQuat::IDENTITY);
+        Self { kind, in_parent, in_part, rest, limits: Vec::new(), spring: None, motor: None }
     }
 
     /// The same joint at other points of the parent and of the part, m.
@@ -56,7 +65,15 @@ impl JointDesc {
     fn validate(&self) -> Result<(), SimError> {
         require_vector(self.in_parent, "the joint's point in the parent")?;
         require_vector(self.in_part, "the joint's point in the part")?;
-        require_rotation(self.rest, "the joint's rotation at rest")
+        require_rotation(self.rest, "the joint's rotation at rest")?;
+        self.limits.iter().try_for_each(|limit| limit.validate(self.kind))?;
+        self.spring.map_or(Ok(()), |spring| spring.validate())?;
+        self.motor.map_or(Ok(()), |motor| motor.validate())?;
+        let pulled = self.spring.is_some() || self.motor.is_some();
+        if pulled && matches!(self.kind, JointKind::Fixed | JointKind::Free) {
+            return Err(SimError::Unusable { what: "fixed and free joints have no springs and motors" });
+        }
+        Ok(())
     }
 }
 
@@ -89,10 +106,20 @@ impl PartDesc {
 
     /// The part's joint with axes of length 1.
     pub(super) fn joint(&self, index: usize) -> Result<Joint, SimError> {
-        let JointDesc { kind, in_parent, in_part, rest } = self.joint;
-        let kind = unit_axes(kind).map_err(|reason| reason.of(self.called(index)))?;
-        let rest = DMat3::from_quat(rest.normalize());
-        Ok(Joint { kind, parent: self.parent, in_parent, in_part, rest, block: None, starts: (0, 0) })
+        let JointDesc { kind, in_parent, in_part, rest, ref limits, spring, motor } = self.joint;
+        Ok(Joint {
+            kind: unit_axes(kind).map_err(|reason| reason.of(self.called(index)))?,
+            parent: self.parent,
+            in_parent,
+            in_part,
+            rest: DMat3::from_quat(rest.normalize()),
+            block: None,
+            starts: (0, 0),
+            limits: limits.iter().map(|limit| limit.normalized()).collect(),
+            spring,
+            motor,
+            controls: 0..0,
+        })
     }
 
     pub(super) fn inertia(&self) -> PartInertia {

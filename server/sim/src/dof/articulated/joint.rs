@@ -1,7 +1,11 @@
 //! One joint: its coordinates, and how they carry a part.
 
+use std::ops::Range;
+
 use glam::{DMat3, DQuat, DVec3};
 
+use super::limit::JointLimit;
+use super::motor::{JointMotor, JointSpring};
 use crate::dof::{BlockSize, Columns, Twist};
 
 /// How a part may move against its parent, or against the world. Axes are those at rest, in the parent's axes; they need
@@ -132,6 +136,11 @@ pub(super) struct Joint {
     pub block: Option<usize>,
     /// Where its share of Q and of Q' starts.
     pub starts: (usize, usize),
+    pub limits: Vec<JointLimit>,
+    pub spring: Option<JointSpring>,
+    pub motor: Option<JointMotor>,
+    /// Of the motor, among the figure's.
+    pub controls: Range<usize>,
 }
 
 /// Origin of a part, and its axes.
@@ -151,14 +160,31 @@ impl Place {
 }
 
 impl Joint {
+    /// Where its coordinates are in the figure's Q.
+    pub fn positions(&self) -> Range<usize> {
+        let size = self.kind.size().map_or(0, |size| size.positions);
+        self.starts.0..self.starts.0 + usize::from(size)
+    }
+
+    /// Where its rates are in the figure's Q'.
+    pub fn rates(&self) -> Range<usize> {
+        let size = self.kind.size().map_or(0, |size| size.rates);
+        self.starts.1..self.starts.1 + usize::from(size)
+    }
+
+    /// Whether it has potentials of its own.
+    pub fn acts(&self) -> bool {
+        !self.limits.is_empty() || self.spring.is_some() || self.motor.is_some()
+    }
+
     /// Its share of the figure's Q.
     pub fn q<'a>(&self, q: &'a [f64]) -> &'a [f64] {
-        &q[self.starts.0..]
+        &q[self.positions()]
     }
 
     /// Its share of the figure's Q'.
     pub fn v<'a>(&self, v: &'a [f64]) -> &'a [f64] {
-        &v[self.starts.1..]
+        &v[self.rates()]
     }
 
     /// From the parent's origin to the part's point of the joint, in the parent's axes, m.

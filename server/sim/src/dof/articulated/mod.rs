@@ -16,16 +16,26 @@
 //! Owns kinematics, inertia and own potentials of such figures; knows nothing of worlds and islands.
 
 mod desc;
+mod inertia;
 mod joint;
+mod limit;
+mod motor;
+mod potentials;
 #[cfg(test)]
 mod tests;
+mod well;
+
+use std::ops::Range;
 
 use glam::{DMat3, DVec3};
 
 pub use desc::{JointDesc, PARTS_MAX, PartDesc};
 pub use joint::JointKind;
+pub use limit::{JointLimit, LimitRange};
+pub use motor::{JointDrive, JointMotor, JointSpring};
+pub use potentials::MotorControls;
 
-use super::interface::{BlockSize, Columns, Dof, Inertia, PartInertia, PartLoad, PartPoint};
+use super::interface::{BlockSize, Columns, Dof, Inertia, LocalState, PartInertia, PartLoad, PartPoint, RateBlock};
 use super::{DofKind, Frame, Twist};
 use crate::error::{SimError, require, require_rotation};
 use crate::potential::geometric_stiffness;
@@ -39,6 +49,8 @@ pub struct Articulated {
     joints: Vec<Joint>,
     inertias: Vec<PartInertia>,
     blocks: Vec<BlockSize>,
+    /// The joint of each block.
+    movers: Vec<u32>,
     /// For every part the joints from the root to it: `paths[path_starts[i]..path_starts[i + 1]]`.
     paths: Vec<u32>,
     path_starts: Vec<u32>,
@@ -52,12 +64,13 @@ impl Articulated {
     /// # Errors
     /// [`SimError::Named`] with the part that is wrong, [`SimError`] where there are none, too many, or nothing moves.
     pub fn new(parts: Vec<PartDesc>) -> Result<Self, SimError> {
-        require((1..=PARTS_MAX).contains(&parts.len()), "number of parts", parts.len() as f64, "1 to 256")?;
+        require((1..=PARTS_MAX).contains(&parts.len()), "number of parts", parts.len() as f64, "1 to 64")?;
         let mut figure = Self {
             joints: Vec::with_capacity(parts.len()),
             inertias: parts.iter().map(PartDesc::inertia).collect(),
             parts,
             blocks: Vec::new(),
+            movers: Vec::new(),
             paths: Vec::new(),
             path_starts: vec![0],
             lengths: (0, 0),
@@ -65,6 +78,13 @@ impl Articulated {
         for index in 0..figure.parts.len() {
             figure.parts[index].validate(index)?;
             figure.add_joint(index)?;
+        }
+        let mut controls = 0;
+        for joint in &mut figure.joints {
+            let motor = joint.motor.and(joint.kind.size());
+            let count = motor.map_or(0, |size| usize::from(size.positions + size.rates) + 1);
+            joint.controls = controls..controls + count;
+            controls += count;
         }
         if figure.blocks.is_empty() {
             return Err(SimError::Unusable { what: "nothing of the figure can move: every joint is fixed" });
@@ -80,6 +100,7 @@ impl Articulated {
             self.lengths.0 += usize::from(size.positions);
             self.lengths.1 += usize::from(size.rates);
             self.blocks.push(size);
+            self.movers.push(index as u32);
         }
         if let Some(parent) = joint.parent {
             let start = self.path_starts[parent as usize] as usize;
@@ -100,8 +121,7 @@ impl Articulated {
     pub fn rest(&self) -> Vec<f64> {
         let mut q = vec![0.0; self.lengths.0];
         for joint in &self.joints {
-            let range = range(joint.starts.0, joint.kind.size().map_or(0, |size| size.positions));
-            joint.kind.rest(&mut q[range]);
+            joint.kind.rest(&mut q[joint.positions()]);
         }
         q
     }
@@ -112,15 +132,23 @@ impl Articulated {
     }
 
     /// Where the coordinates of a part's joint are in Q; `None` for a part that there is not.
-    pub fn positions(&self, part: u32) -> Option<std::ops::Range<usize>> {
-        let joint = self.joints.get(part as usize)?;
-        Some(range(joint.starts.0, joint.kind.size().map_or(0, |size| size.positions)))
+    pub fn positions(&self, part: u32) -> Option<Range<usize>> {
+        self.joints.get(part as usize).map(Joint::positions)
     }
 
     /// Where the rates of a part's joint are in Q'; `None` for a part that there is not.
-    pub fn rates(&self, part: u32) -> Option<std::ops::Range<usize>> {
-        let joint = self.joints.get(part as usize)?;
-        Some(range(joint.starts.1, joint.kind.size().map_or(0, |size| size.rates)))
+    pub fn rates(&self, part: u32) -> Option<Range<usize>> {
+        self.joints.get(part as usize).map(Joint::rates)
+    }
+
+    /// Where the rates of a block are in Q'.
+    fn rates_of(&self, block: usize) -> Range<usize> {
+        self.joints[self.movers[block] as usize].rates()
+    }
+
+    /// Where a part is.
+    fn place(&self, part: u32, q: &[f64]) -> Place {
+        self.path(part).fold(Place::WORLD, |place, joint| joint.place(&place, q))
     }
 
     /// Joints from the root to a part.
@@ -128,10 +156,6 @@ impl Articulated {
         let ends = [part, part + 1].map(|i| self.path_starts[i as usize] as usize);
         self.paths[ends[0]..ends[1]].iter().map(|&i| &self.joints[i as usize])
     }
-}
-
-fn range(start: usize, size: u8) -> std::ops::Range<usize> {
-    start..start + usize::from(size)
 }
 
 impl Dof for Articulated {
@@ -155,9 +179,7 @@ impl Dof for Articulated {
 
     fn step(&self, q0: &[f64], v1: &[f64], dt: f64, q1: &mut [f64]) {
         for joint in &self.joints {
-            let Some(size) = joint.kind.size() else { continue };
-            let (q, v) = (range(joint.starts.0, size.positions), range(joint.starts.1, size.rates));
-            joint.kind.step(&q0[q.clone()], &v1[v], dt, &mut q1[q]);
+            joint.kind.step(joint.q(q0), joint.v(v1), dt, &mut q1[joint.positions()]);
         }
     }
 
@@ -177,8 +199,7 @@ impl Dof for Articulated {
     }
 
     fn jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns)) {
-        let part = self.path(at.part).fold(Place::WORLD, |place, joint| joint.place(&place, q));
-        let x: DVec3 = part.point(at.point);
+        let x: DVec3 = self.place(at.part, q).point(at.point);
         let mut place = Place::WORLD;
         for joint in self.path(at.part) {
             if let Some(block) = joint.block {
@@ -219,5 +240,29 @@ impl Dof for Articulated {
             stiffen(parent, handed_on, joint.arm(q1));
             at_centres[parent].impulse += handed_on;
         }
+    }
+
+    fn controls(&self) -> Vec<f64> {
+        self.first_controls()
+    }
+
+    fn check_controls(&self, controls: &[f64], dt: f64) -> Result<(), SimError> {
+        self.check_motors(controls, dt)
+    }
+
+    fn prepare(&self, at: &LocalState, prepared: &mut Vec<f64>) {
+        self.prepare_inertia(at.q0, prepared);
+    }
+
+    fn energy(&self, at: &LocalState, gradient: &mut [f64]) -> f64 {
+        self.potential_energy(at, gradient)
+    }
+
+    fn stored_energy(&self, at: &LocalState) -> f64 {
+        self.spring_energy(at.q1)
+    }
+
+    fn stiffness(&self, at: &LocalState, add: &mut dyn FnMut(usize, usize, &RateBlock)) {
+        self.potential_stiffness(at, add);
     }
 }

@@ -1,0 +1,201 @@
+//! Limits: what keeps a joint within a range.
+//!
+//! Beyond the range a spring pushes back whose stiffness is the engine's, chosen such that the author's tolerance is
+//! kept: by the inertia that the joint feels, by the speed with which it arrives, and, where something heavier leans on
+//! it, by a second and much stiffer spring over the second half of the tolerance.
+
+use glam::{DMat3, DQuat, DVec3};
+
+use super::joint::JointKind;
+use super::well::Well;
+use crate::error::{SimError, require, require_vector};
+use crate::potential::outer;
+
+/// What a limit keeps of a joint. Axes are those at rest, in the parent's axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LimitRange {
+    /// A coordinate of a hinge, slider or universal joint stays within `lower` to `upper`, rad or m.
+    Coordinate {
+        /// Which: 0, or 1 for the second angle of a universal joint.
+        index: u8,
+        /// Least.
+        lower: f64,
+        /// Most.
+        upper: f64,
+    },
+    /// An axis of a ball joint's part stays within an angle of where it is at rest: a cone.
+    Swing {
+        /// Of the cone.
+        axis: DVec3,
+        /// Half of the cone's opening, rad.
+        upper: f64,
+    },
+    /// A ball joint's part turns about an axis of its own by no more than `lower` to `upper`, rad within ±π.
+    Twist {
+        /// It turns about.
+        axis: DVec3,
+        /// Least.
+        lower: f64,
+        /// Most.
+        upper: f64,
+    },
+}
+
+/// A limit of a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointLimit {
+    /// What it keeps.
+    pub range: LimitRange,
+    /// How far beyond the range the joint may be at the end of a tick, rad or m.
+    pub tolerance: f64,
+}
+
+/// Stiffness of a limit that is reached slowly, in inertias per dt².
+const STIFFNESS: f64 = 100.0;
+
+/// Stiffness of one that is reached fast, at most, in the same unit.
+const STIFFEST: f64 = 4e4;
+
+/// How much stiffer the second half of the tolerance is.
+const HARDENING: f64 = 1e3;
+
+/// Most that a tick takes back of what is beyond the limit, in tolerances: a joint that was put there does not leap.
+const RECOVERY: f64 = 10.0;
+
+impl JointLimit {
+    /// A limit of a hinge or slider with a tolerance of 0.01 rad or m.
+    pub fn range(lower: f64, upper: f64) -> Self {
+        Self { range: LimitRange::Coordinate { index: 0, lower, upper }, tolerance: 0.01 }
+    }
+
+    pub(super) fn validate(&self, kind: JointKind) -> Result<(), SimError> {
+        require((1e-6..1.0).contains(&self.tolerance), "tolerance of the limit", self.tolerance, "1e-6 to below 1")?;
+        let ordered = |lower: f64, upper: f64| {
+            require(lower.abs() < 1e6, "lower bound of the limit", lower, "finite and below 1e6")?;
+            require(upper >= lower && upper < 1e6, "upper bound of the limit", upper, "the lower bound or more")
+        };
+        let axis = |axis: DVec3| {
+            require_vector(axis, "axis of the limit")?;
+            require(axis.length() > 1e-9, "length of the limit's axis", axis.length(), "above 0")
+        };
+        let coordinates = match kind {
+            JointKind::Hinge { .. } | JointKind::Slider { .. } => 1,
+            JointKind::Universal { .. } => 2,
+            JointKind::Fixed | JointKind::Ball | JointKind::Free => 0,
+        };
+        match self.range {
+            LimitRange::Coordinate { index, lower, upper } if index < coordinates => ordered(lower, upper),
+            LimitRange::Swing { axis: a, upper } if kind == JointKind::Ball => {
+                require((0.01..3.13).contains(&upper), "angle of the swing limit", upper, "0.01 to 3.13 rad")?;
+                axis(a)
+            }
+            LimitRange::Twist { axis: a, lower, upper } if kind == JointKind::Ball => {
+                let within = lower > -3.13 && upper < 3.13;
+                require(within, "bound of the twist limit", if lower > -3.13 { upper } else { lower }, "within ±3.13")?;
+                ordered(lower, upper)?;
+                axis(a)
+            }
+            _ => Err(SimError::Unusable { what: "the joint has no such coordinate to limit" }),
+        }
+    }
+
+    /// The limit with an axis of length 1.
+    pub(super) fn normalized(self) -> Self {
+        let range = match self.range {
+            LimitRange::Swing { axis, upper } => LimitRange::Swing { axis: axis.normalize(), upper },
+            LimitRange::Twist { axis, lower, upper } => LimitRange::Twist { axis: axis.normalize(), lower, upper },
+            range => range,
+        };
+        Self { range, ..self }
+    }
+
+    /// Adds the limit's potential for a joint that was at `q0` with rates of size `speed` and is at `q1`.
+    pub(super) fn add(&self, start: &Start, q0: &[f64], q1: &[f64], well: &mut Well) {
+        match self.range {
+            LimitRange::Coordinate { index, lower, upper } => {
+                let (i, axis) = (usize::from(index), DVec3::AXES[usize::from(index)]);
+                well.add_along(axis, self.wall(start, q0[i] - upper, q1[i] - upper));
+                well.add_along(-axis, self.wall(start, lower - q0[i], lower - q1[i]));
+            }
+            LimitRange::Swing { axis, upper } => {
+                let (before, now) = (Swing::new(q0, axis), Swing::new(q1, axis));
+                let [energy, slope, curvature] = self.wall(start, before.angle - upper, now.angle - upper);
+                well.add_along(now.direction, [energy, slope, curvature]);
+                well.hessian += now.curvature() * slope;
+            }
+            LimitRange::Twist { axis, lower, upper } => {
+                let ((before, _), (now, direction)) = (twist(q0, axis), twist(q1, axis));
+                well.add_along(direction, self.wall(start, before - upper, now - upper));
+                well.add_along(-direction, self.wall(start, lower - before, lower - now));
+            }
+        }
+    }
+
+    /// Energy, slope and curvature at a depth beyond a bound.
+    fn wall(&self, start: &Start, before: f64, now: f64) -> [f64; 3] {
+        let depth = now - (before - RECOVERY * self.tolerance).max(0.0);
+        if depth <= 0.0 {
+            return [0.0; 3];
+        }
+        let half = self.tolerance / 2.0;
+        let stiffness =
+            start.inertia / (start.dt * start.dt) * (start.speed * start.dt / half).clamp(STIFFNESS, STIFFEST);
+        let (soft, hard) = (spring(depth, stiffness), spring((depth - half).max(0.0), HARDENING * stiffness));
+        std::array::from_fn(|i| soft[i] + if depth > half { hard[i] } else { 0.0 })
+    }
+}
+
+/// What a limit knows of the start of the tick.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    /// s.
+    pub dt: f64,
+    /// What the joint feels, kg or kg m².
+    pub inertia: f64,
+    /// Of the joint's rates.
+    pub speed: f64,
+}
+
+fn spring(depth: f64, stiffness: f64) -> [f64; 3] {
+    [0.5 * stiffness * depth * depth, stiffness * depth, stiffness]
+}
+
+/// How far an axis has swung.
+struct Swing {
+    angle: f64,
+    /// A turn about this, in the parent's axes, swings it further.
+    direction: DVec3,
+    /// The axis as it is.
+    axis: DVec3,
+}
+
+impl Swing {
+    fn new(q: &[f64], axis: DVec3) -> Self {
+        let swung = DQuat::from_slice(q) * axis;
+        let across = axis.cross(swung);
+        let direction = across.try_normalize().unwrap_or_else(|| axis.any_orthonormal_vector());
+        Self { angle: across.length().atan2(axis.dot(swung)), direction, axis: swung }
+    }
+
+    /// Positive part of the angle's second derivative with respect to turns, cot α (s·d)² − (s·d)(c·d) for the axis c and
+    /// s = c × direction: ½ cot ½α along s (1 + cos α) − c sin α.
+    fn curvature(&self) -> DMat3 {
+        let (sine, cosine) = self.angle.sin_cos();
+        let along = self.axis.cross(self.direction) * (1.0 + cosine) - self.axis * sine;
+        let along = along.normalize_or_zero();
+        outer(along, along) * (0.5 * (1.0 + cosine) / sine.max(1e-9))
+    }
+}
+
+/// Turn about an axis, and its derivative with respect to turns in the parent's axes.
+fn twist(q: &[f64], axis: DVec3) -> (f64, DVec3) {
+    let (v, w) = (DVec3::from_slice(q), q[3]);
+    let along = v.dot(axis);
+    let size = along * along + w * w;
+    if size < 1e-12 {
+        // Swung by half a turn: there is no telling twist from swing.
+        return (0.0, DVec3::ZERO);
+    }
+    let (sign, direction) = (1f64.copysign(w), (w * (w * axis + v.cross(axis)) + along * v) / size);
+    (2.0 * (sign * along).atan2(sign * w), direction)
+}

@@ -1,0 +1,180 @@
+//! Springs and motors at joints.
+
+use glam::{DMat3, DQuat, DVec3};
+
+use super::joint::JointKind;
+use super::well::Well;
+use crate::error::{LARGEST, SimError, require, require_rotation};
+use crate::potential::{PdGains, outer};
+
+/// A spring with a damper that pulls a joint to rest, as strong as its author says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointSpring {
+    /// N m/rad, N/m for a slider.
+    pub stiffness: f64,
+    /// N m s/rad, N s/m for a slider.
+    pub damping: f64,
+}
+
+/// A motor at a joint. Its targets and its strength may be changed at any tick: [`super::MotorControls`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointMotor {
+    /// How it follows its targets.
+    pub drive: JointDrive,
+    /// Largest torque, N m; force of a slider, N; infinite for none.
+    pub max_force: f64,
+}
+
+/// How a motor follows its targets, as a player sees it: the engine finds the gains for its tick and for the inertia
+/// that the joint feels, joints with motors being held and those without being loose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum JointDrive {
+    /// Swings to the target like a damped spring.
+    Position {
+        /// Hz.
+        frequency: f64,
+        /// 1 is critical.
+        damping_ratio: f64,
+    },
+    /// Approaches the target rate and does not mind the position.
+    Velocity {
+        /// After this time 1/e of the difference is left, s.
+        time_constant: f64,
+    },
+}
+
+impl JointSpring {
+    pub(super) fn validate(&self) -> Result<(), SimError> {
+        let Self { stiffness, damping } = *self;
+        require((0.0..1e12).contains(&stiffness), "stiffness of the spring", stiffness, "0 to below 1e12 N m/rad")?;
+        require((0.0..1e12).contains(&damping), "damping of the spring", damping, "0 to below 1e12 N m s/rad")
+    }
+
+    /// Adds the potential of a joint at `q` with rates `v`.
+    pub(super) fn add(&self, kind: JointKind, q: &[f64], v: &[f64], dt: f64, well: &mut Well) {
+        let (stretch, stretching) = (stretch(kind, q), rates(kind, v));
+        well.energy += self.stored(kind, q) + 0.5 * self.damping * dt * stretching.length_squared();
+        well.gradient += stretch * self.stiffness + stretching * self.damping;
+        let stiff = match kind {
+            JointKind::Ball => turned_stiffness(stretch),
+            _ => DMat3::IDENTITY,
+        };
+        well.hessian += stiff * self.stiffness + DMat3::IDENTITY * (self.damping / dt);
+    }
+
+    /// Energy of a joint at `q`, J.
+    pub(super) fn stored(&self, kind: JointKind, q: &[f64]) -> f64 {
+        0.5 * self.stiffness * stretch(kind, q).length_squared()
+    }
+}
+
+/// Derivative of the vector of a rotation, symmetrised: 1 along it, φ/2 cot φ/2 across.
+fn turned_stiffness(turn: DVec3) -> DMat3 {
+    let half = turn.length() / 2.0;
+    if half < 1e-6 {
+        return DMat3::IDENTITY;
+    }
+    let (along, across) = (turn / (2.0 * half), (half / half.tan()).max(0.0));
+    DMat3::IDENTITY * across + outer(along, along) * (1.0 - across)
+}
+
+/// A joint's coordinates as numbers that its rates change; of a ball joint, the vector of its rotation.
+fn stretch(kind: JointKind, q: &[f64]) -> DVec3 {
+    match kind {
+        JointKind::Ball => rotation_vector(DQuat::from_slice(q)),
+        _ => rates(kind, q),
+    }
+}
+
+/// One to three numbers; those that a joint does not have are zero.
+fn rates(kind: JointKind, v: &[f64]) -> DVec3 {
+    match kind {
+        JointKind::Fixed | JointKind::Free => DVec3::ZERO,
+        JointKind::Hinge { .. } | JointKind::Slider { .. } => DVec3::new(v[0], 0.0, 0.0),
+        JointKind::Universal { .. } => DVec3::new(v[0], v[1], 0.0),
+        JointKind::Ball => DVec3::from_slice(v),
+    }
+}
+
+/// The shorter way round.
+fn rotation_vector(q: DQuat) -> DVec3 {
+    if q.w < 0.0 { (-q).to_scaled_axis() } else { q.to_scaled_axis() }
+}
+
+impl JointDrive {
+    /// Gains per unit of inertia in a world of ticks of `dt`.
+    ///
+    /// # Errors
+    /// What this tick cannot show.
+    fn gains(self, dt: f64) -> Result<PdGains, SimError> {
+        match self {
+            Self::Position { frequency, damping_ratio } => PdGains::new(frequency, damping_ratio, dt),
+            Self::Velocity { time_constant } => {
+                require((1e-3..1e6).contains(&time_constant), "time_constant", time_constant, "1e-3 to below 1e6 s")?;
+                // (1 + dt Kd) is what a tick shrinks the difference by.
+                Ok(PdGains { stiffness: 0.0, damping: ((dt / time_constant).exp() - 1.0) / dt })
+            }
+        }
+    }
+}
+
+impl JointMotor {
+    pub(super) fn validate(&self) -> Result<(), SimError> {
+        let strong = self.max_force >= 0.0;
+        if strong { Ok(()) } else { Err(out_of_range(self.max_force)) }
+    }
+
+    /// What it is steered by at first: a joint at rest that shall stay there.
+    pub(super) fn controls(&self, kind: JointKind, controls: &mut Vec<f64>) {
+        let Some(size) = kind.size() else { return };
+        let start = controls.len();
+        controls.resize(start + usize::from(size.positions), 0.0);
+        kind.rest(&mut controls[start..]);
+        controls.resize(controls.len() + usize::from(size.rates), 0.0);
+        controls.push(self.max_force);
+    }
+
+    pub(super) fn check_controls(&self, kind: JointKind, controls: &[f64], dt: f64) -> Result<(), SimError> {
+        self.drive.gains(dt)?;
+        let Some((&strength, targets)) = controls.split_last() else { return Ok(()) };
+        targets.iter().try_for_each(|&x| require(x.abs() < LARGEST, "target of the motor", x, "finite, below 1e9"))?;
+        if kind == JointKind::Ball {
+            require_rotation(DQuat::from_slice(targets), "target of the motor")?;
+        }
+        Self { max_force: strength, ..*self }.validate()
+    }
+
+    /// Adds the potential of a joint that was at `q0` and has rates `v1`: a bowl around the rates that would be right,
+    /// with a constant slope where the force is at its limit. `inertia` is what the joint feels.
+    pub(super) fn add(&self, kind: JointKind, at: &Driven, inertia: DMat3, well: &mut Well) {
+        let Ok(PdGains { stiffness, damping }) = self.drive.gains(at.dt) else { return };
+        let Some((&max_force, targets)) = at.controls.split_last() else { return };
+        let positions = kind.size().map_or(0, |size| usize::from(size.positions));
+        let (target, target_rates) = targets.split_at(positions);
+        let error = match kind {
+            JointKind::Ball => rotation_vector(DQuat::from_slice(target) * DQuat::from_slice(at.q0).inverse()),
+            _ => rates(kind, target) - rates(kind, at.q0),
+        };
+        let slope = stiffness * at.dt + damping;
+        let goal = (error * stiffness + rates(kind, target_rates) * damping) / slope.max(1e-300);
+        let missing = goal - rates(kind, at.v1);
+        let force = inertia * missing * slope;
+        let left = if force.length() > max_force { max_force / force.length() } else { 1.0 };
+        well.energy += left * (1.0 - left / 2.0) * force.dot(missing) * at.dt;
+        well.gradient -= force * left;
+        well.hessian += inertia * (slope * left / at.dt);
+    }
+}
+
+/// A joint with a motor during a tick.
+pub(super) struct Driven<'a> {
+    pub dt: f64,
+    pub q0: &'a [f64],
+    pub v1: &'a [f64],
+    /// Target positions, target rates, largest force.
+    pub controls: &'a [f64],
+}
+
+fn out_of_range(max_force: f64) -> SimError {
+    SimError::OutOfRange { what: "max_force of the motor", value: max_force, allowed: "0 or more" }
+}

@@ -1,0 +1,24 @@
+//! A joint's own potentials, summed up over its rates.
+
+use glam::{DMat3, DVec3};
+
+/// Energy of a joint of one to three rates, with its derivatives with respect to their displacements. What a joint does
+/// not have stays zero.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Well {
+    /// J.
+    pub energy: f64,
+    /// Minus the force, N or N m.
+    pub gradient: DVec3,
+    /// Positive semidefinite.
+    pub hessian: DMat3,
+}
+
+impl Well {
+    /// Adds a function of a single number that the rates change along `direction`: its value, slope and curvature.
+    pub fn add_along(&mut self, direction: DVec3, [energy, slope, curvature]: [f64; 3]) {
+        self.energy += energy;
+        self.gradient += direction * slope;
+        self.hessian += crate::potential::outer(direction, direction) * curvature;
+    }
+}
