@@ -169,7 +169,7 @@ pub trait Dof: Send + Sync {
         Vec::new()
     }
 
-    /// What is wrong with such numbers in a world of ticks of `dt` seconds. They are finite and as many as at first.
+    /// What is wrong with such numbers in a world of ticks of `dt` seconds. They are no NaN and as many as at first.
     ///
     /// # Errors
     /// [`SimError`] naming the item.

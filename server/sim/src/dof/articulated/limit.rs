@@ -4,12 +4,13 @@
 //! kept: by the inertia that the joint feels, by the speed with which it arrives, and, where something heavier leans on
 //! it, by a second and much stiffer spring over the second half of the tolerance.
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DQuat, DVec3};
 
 use super::joint::JointKind;
+use super::turning::{Turning, differentiate};
 use super::well::Well;
+use crate::autodiff::{Scalar, Vec3};
 use crate::error::{SimError, require, require_vector};
-use crate::potential::outer;
 
 /// What a limit keeps of a joint. Axes are those at rest, in the parent's axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,7 +110,7 @@ impl JointLimit {
         Self { range, ..self }
     }
 
-    /// Adds the limit's potential for a joint that was at `q0` with rates of size `speed` and is at `q1`.
+    /// Adds the limit's potential for a joint that was at `q0` and is at `q1`.
     pub(super) fn add(&self, start: &Start, q0: &[f64], q1: &[f64], well: &mut Well) {
         match self.range {
             LimitRange::Coordinate { index, lower, upper } => {
@@ -118,15 +119,19 @@ impl JointLimit {
                 well.add_along(-axis, self.wall(start, lower - q0[i], lower - q1[i]));
             }
             LimitRange::Swing { axis, upper } => {
-                let (before, now) = (Swing::new(q0, axis), Swing::new(q1, axis));
-                let [energy, slope, curvature] = self.wall(start, before.angle - upper, now.angle - upper);
-                well.add_along(now.direction, [energy, slope, curvature]);
-                well.hessian += now.curvature() * slope;
+                let rotation = DQuat::from_slice(q0);
+                let (before, ..) = swing(&Turning::new(rotation, Vec3::<f64>::ZERO), axis);
+                let (now, gradient, bend) =
+                    differentiate(start.turn, |turn| swing(&Turning::new(rotation, turn), axis));
+                well.add_bent(self.wall(start, before - upper, now - upper), gradient, bend);
             }
             LimitRange::Twist { axis, lower, upper } => {
-                let ((before, _), (now, direction)) = (twist(q0, axis), twist(q1, axis));
-                well.add_along(direction, self.wall(start, before - upper, now - upper));
-                well.add_along(-direction, self.wall(start, lower - before, lower - now));
+                let rotation = DQuat::from_slice(q0);
+                let (before, ..) = twist(&Turning::new(rotation, Vec3::<f64>::ZERO), axis);
+                let (now, gradient, bend) =
+                    differentiate(start.turn, |turn| twist(&Turning::new(rotation, turn), axis));
+                well.add_bent(self.wall(start, before - upper, now - upper), gradient, bend);
+                well.add_bent(self.wall(start, lower - before, lower - now), -gradient, -bend);
             }
         }
     }
@@ -154,48 +159,36 @@ pub(super) struct Start {
     pub inertia: f64,
     /// Of the joint's rates.
     pub speed: f64,
+    /// Of a ball joint since the start, a rotation vector in the parent's axes.
+    pub turn: DVec3,
 }
 
 fn spring(depth: f64, stiffness: f64) -> [f64; 3] {
     [0.5 * stiffness * depth * depth, stiffness * depth, stiffness]
 }
 
-/// How far an axis has swung.
-struct Swing {
-    angle: f64,
-    /// A turn about this, in the parent's axes, swings it further.
-    direction: DVec3,
-    /// The axis as it is.
-    axis: DVec3,
+/// How far an axis has swung, and the derivative with respect to the turn.
+fn swing<S: Scalar>(rotation: &Turning<S>, axis: DVec3) -> (S, Vec3<S>) {
+    let swung = rotation.apply(axis);
+    let across = Vec3::constant(axis).cross(swung);
+    let sine = across.length();
+    // Straight ahead, or straight back, it swings about any axis.
+    let direction =
+        if sine.below(1e-9) { Vec3::constant(axis.any_orthonormal_vector()) } else { across.scale(S::ONE / sine) };
+    (sine.atan2(swung.along(axis)), rotation.pull_back(direction))
 }
 
-impl Swing {
-    fn new(q: &[f64], axis: DVec3) -> Self {
-        let swung = DQuat::from_slice(q) * axis;
-        let across = axis.cross(swung);
-        let direction = across.try_normalize().unwrap_or_else(|| axis.any_orthonormal_vector());
-        Self { angle: across.length().atan2(axis.dot(swung)), direction, axis: swung }
-    }
-
-    /// Positive part of the angle's second derivative with respect to turns, cot α (s·d)² − (s·d)(c·d) for the axis c and
-    /// s = c × direction: ½ cot ½α along s (1 + cos α) − c sin α.
-    fn curvature(&self) -> DMat3 {
-        let (sine, cosine) = self.angle.sin_cos();
-        let along = self.axis.cross(self.direction) * (1.0 + cosine) - self.axis * sine;
-        let along = along.normalize_or_zero();
-        outer(along, along) * (0.5 * (1.0 + cosine) / sine.max(1e-9))
-    }
-}
-
-/// Turn about an axis, and its derivative with respect to turns in the parent's axes.
-fn twist(q: &[f64], axis: DVec3) -> (f64, DVec3) {
-    let (v, w) = (DVec3::from_slice(q), q[3]);
-    let along = v.dot(axis);
+/// Turn about an axis, within ±π, and the derivative with respect to the turn.
+fn twist<S: Scalar>(rotation: &Turning<S>, axis: DVec3) -> (S, Vec3<S>) {
+    let (v, w) = (rotation.v, rotation.w);
+    let along = v.along(axis);
     let size = along * along + w * w;
-    if size < 1e-12 {
+    if size.below(1e-12) {
         // Swung by half a turn: there is no telling twist from swing.
-        return (0.0, DVec3::ZERO);
+        return (S::ZERO, Vec3::ZERO);
     }
-    let (sign, direction) = (1f64.copysign(w), (w * (w * axis + v.cross(axis)) + along * v) / size);
-    (2.0 * (sign * along).atan2(sign * w), direction)
+    let axis = Vec3::constant(axis);
+    let direction = ((axis.scale(w) + v.cross(axis)).scale(w) + v.scale(along)).scale(S::ONE / size);
+    let sign = if w.below(0.0) { -1.0 } else { 1.0 };
+    ((along * sign).atan2(w * sign) * 2.0, rotation.pull_back(direction))
 }

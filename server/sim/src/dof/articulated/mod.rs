@@ -23,6 +23,7 @@ mod motor;
 mod potentials;
 #[cfg(test)]
 mod tests;
+mod turning;
 mod well;
 
 use std::ops::Range;

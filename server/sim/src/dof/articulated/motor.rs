@@ -3,9 +3,11 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::joint::JointKind;
-use super::well::Well;
+use super::turning::{Turning, differentiate};
+use super::well::{Well, positive_part};
+use crate::autodiff::{Scalar, Vec3};
 use crate::error::{LARGEST, SimError, require, require_rotation};
-use crate::potential::{PdGains, outer};
+use crate::potential::PdGains;
 
 /// A spring with a damper that pulls a joint to rest, as strong as its author says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,16 +52,21 @@ impl JointSpring {
         require((0.0..1e12).contains(&damping), "damping of the spring", damping, "0 to below 1e12 N m s/rad")
     }
 
-    /// Adds the potential of a joint at `q` with rates `v`.
-    pub(super) fn add(&self, kind: JointKind, q: &[f64], v: &[f64], dt: f64, well: &mut Well) {
-        let (stretch, stretching) = (stretch(kind, q), rates(kind, v));
-        well.energy += self.stored(kind, q) + 0.5 * self.damping * dt * stretching.length_squared();
-        well.gradient += stretch * self.stiffness + stretching * self.damping;
-        let stiff = match kind {
-            JointKind::Ball => turned_stiffness(stretch),
-            _ => DMat3::IDENTITY,
-        };
-        well.hessian += stiff * self.stiffness + DMat3::IDENTITY * (self.damping / dt);
+    /// Adds the potential of a joint that was at `q0`, is at `q1` and has rates `v1`.
+    pub(super) fn add(&self, kind: JointKind, [q0, q1, v1]: [&[f64]; 3], dt: f64, well: &mut Well) {
+        let stretching = rates(kind, v1);
+        well.energy += self.stored(kind, q1) + 0.5 * self.damping * dt * stretching.length_squared();
+        well.gradient += stretching * self.damping;
+        well.hessian += DMat3::IDENTITY * (self.damping / dt);
+        if kind == JointKind::Ball {
+            let start = DQuat::from_slice(q0);
+            let (_, gradient, hessian) = differentiate(stretching * dt, |turn| half_square(&Turning::new(start, turn)));
+            well.gradient += gradient * self.stiffness;
+            well.hessian += positive_part(hessian) * self.stiffness;
+        } else {
+            well.gradient += stretch(kind, q1) * self.stiffness;
+            well.hessian += DMat3::IDENTITY * self.stiffness;
+        }
     }
 
     /// Energy of a joint at `q`, J.
@@ -68,14 +75,14 @@ impl JointSpring {
     }
 }
 
-/// Derivative of the vector of a rotation, symmetrised: 1 along it, φ/2 cot φ/2 across.
-fn turned_stiffness(turn: DVec3) -> DMat3 {
-    let half = turn.length() / 2.0;
-    if half < 1e-6 {
-        return DMat3::IDENTITY;
-    }
-    let (along, across) = (turn / (2.0 * half), (half / half.tan()).max(0.0));
-    DMat3::IDENTITY * across + outer(along, along) * (1.0 - across)
+/// Half of the squared angle of a rotation, and the derivative with respect to the turn.
+fn half_square<S: Scalar>(rotation: &Turning<S>) -> (S, Vec3<S>) {
+    let sign = if rotation.w.below(0.0) { -1.0 } else { 1.0 };
+    let (v, w) = (rotation.v * sign, rotation.w * sign);
+    let sine = v.length();
+    let vector = if sine.below(1e-9) { v * 2.0 } else { v.scale(sine.atan2(w) * 2.0 / sine) };
+    // A small turn changes half the square by what it has along the rotation's axis.
+    (vector.dot(vector) * 0.5, rotation.pull_back(vector))
 }
 
 /// A joint's coordinates as numbers that its rates change; of a ball joint, the vector of its rotation.

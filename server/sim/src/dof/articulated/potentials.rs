@@ -2,9 +2,11 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
+
 use super::Articulated;
 use super::inertia::MassMatrix;
-use super::joint::Joint;
+use super::joint::{Joint, JointKind};
 use super::limit::Start;
 use super::motor::Driven;
 use super::well::Well;
@@ -103,7 +105,7 @@ impl Articulated {
         let mut well = Well::default();
         let (q0, q1, v1) = (joint.q(at.q0), joint.q(at.q1), joint.v(at.v1));
         if let Some(spring) = joint.spring {
-            spring.add(joint.kind, q1, v1, at.dt, &mut well);
+            spring.add(joint.kind, [q0, q1, v1], at.dt, &mut well);
         }
         let (held, loose) = at.prepared.split_at(at.prepared.len().min(self.lengths.1));
         if let Some(motor) = joint.motor {
@@ -115,7 +117,8 @@ impl Articulated {
         if !joint.limits.is_empty() {
             let largest = |numbers: &[f64]| numbers.iter().fold(0.0f64, |most, x| most.max(x.abs()));
             let (inertia, speed) = (largest(&held[joint.rates()]), largest(&at.v0[joint.rates()]));
-            let start = Start { dt: at.dt, inertia, speed };
+            let turn = if joint.kind == JointKind::Ball { DVec3::from_slice(v1) * at.dt } else { DVec3::ZERO };
+            let start = Start { dt: at.dt, inertia, speed, turn };
             joint.limits.iter().for_each(|limit| limit.add(&start, q0, q1, &mut well));
         }
         well

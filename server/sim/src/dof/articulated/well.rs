@@ -2,6 +2,8 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::eigen::symmetric_eigen;
+
 /// Energy of a joint of one to three rates, with its derivatives with respect to their displacements. What a joint does
 /// not have stays zero.
 #[derive(Clone, Copy, Debug, Default)]
@@ -15,10 +17,25 @@ pub(super) struct Well {
 }
 
 impl Well {
+    /// Adds a function of a number that is itself one of the rates' displacements: its slope and curvature there, and
+    /// the number's gradient and Hessian. Of what bends the number, the positive part.
+    pub fn add_bent(&mut self, [energy, slope, curvature]: [f64; 3], gradient: DVec3, bend: DMat3) {
+        if slope != 0.0 {
+            self.add_along(gradient, [energy, slope, curvature]);
+            self.hessian += positive_part(bend * slope);
+        }
+    }
+
     /// Adds a function of a single number that the rates change along `direction`: its value, slope and curvature.
     pub fn add_along(&mut self, direction: DVec3, [energy, slope, curvature]: [f64; 3]) {
         self.energy += energy;
         self.gradient += direction * slope;
         self.hessian += crate::potential::outer(direction, direction) * curvature;
     }
+}
+
+/// Of a symmetric matrix.
+pub(super) fn positive_part(m: DMat3) -> DMat3 {
+    let (values, axes) = symmetric_eigen(m);
+    axes * DMat3::from_diagonal(values.max(DVec3::ZERO)) * axes.transpose()
 }
