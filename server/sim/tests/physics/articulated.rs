@@ -183,11 +183,11 @@ fn a_free_figure_keeps_its_momentum_and_gains_no_energy() {
 }
 
 /// Two rods, one on the other, fall from the level: joint coordinates and rigid bodies on ball joints are two schemes of
-/// one system. They differ by the tick: 0.13 m after a second and some 5 m of way at 30 Hz, an eighth of that at 240 Hz.
+/// one system. They differ by the tick: 0.13 m after a second and some 5 m of way at 30 Hz, a fifth of that at 240 Hz.
 #[test]
 fn a_double_pendulum_is_that_of_rigid_bodies() {
     let rod = Shape::Box { half: DVec3::new(0.5, 0.05, 0.05) };
-    for (ticks, tolerance) in [(30, 0.13), (240, 0.02)] {
+    for (ticks, tolerance) in [(30, 0.13), (240, 0.03)] {
         let [mut figures, mut bodies] = [0, 0].map(|_| {
             let mut settings = Settings::at(1.0 / f64::from(ticks));
             settings.solver.tolerance = 1e-8;
@@ -199,7 +199,7 @@ fn a_double_pendulum_is_that_of_rigid_bodies() {
         let mut last = Anchor::world(DVec3::ZERO);
         let ids = [0.5, 1.5].map(|x| {
             let id = bodies.add_rigid_body(RigidBodyDesc::new(DVec3::X * x, 1.0, rod.inertia(1.0))).unwrap();
-            bodies.add_ball_joint(BallJointDesc { a: last, b: Anchor::body(id, DVec3::X * -0.5) }).unwrap();
+            bodies.add_ball_joint(BallJointDesc::new(last, Anchor::body(id, DVec3::X * -0.5))).unwrap();
             last = Anchor::body(id, DVec3::X * 0.5);
             id
         });
@@ -313,7 +313,7 @@ fn hinge_limits_hold_to_their_tolerance() {
         if let Some(mass) = load {
             let ball = world.add_rigid_body(RigidBodyDesc::new(DVec3::X, mass, DVec3::splat(10.0))).unwrap();
             let (a, b) = (Anchor::part(id, 0, DVec3::X * 0.5), Anchor::body(ball, DVec3::ZERO));
-            world.add_ball_joint(BallJointDesc { a, b }).unwrap();
+            world.add_ball_joint(BallJointDesc::new(a, b)).unwrap();
         }
         for tick in 0..90 {
             world.step();
