@@ -7,6 +7,7 @@ mod determinism;
 mod hostile;
 mod joints;
 mod own_kind;
+mod sheep;
 mod solvers;
 mod tolerance;
 
