@@ -34,6 +34,7 @@ pub use collide::{Collider, ContactView, Shape, StaticDesc, StaticId};
 pub use dof::articulated::{
     Articulated, JointDesc, JointDrive, JointKind, JointLimit, JointMotor, JointSpring, LimitRange, PartDesc,
 };
+pub use dof::finite_elements::FiniteElements;
 pub use dof::{BodyId, Dof, DofKind, FigureDesc, Frame, PartCollider, PartPoint, ParticleDesc, RigidBodyDesc};
 pub use error::SimError;
 pub use glam::{DMat3, DQuat, DVec3};

@@ -112,7 +112,8 @@ impl FigureBody {
     /// Energy that its own potentials hold, J.
     pub fn stored_energy(&self, q: &[f64], v: &[f64], dt: f64) -> f64 {
         let mut prepared = Vec::new();
-        let at = LocalState { dt, q0: q, v0: v, q1: q, v1: v, controls: &self.controls, prepared: &[] };
+        let at =
+            LocalState { dt, q0: q, v0: v, q1: q, v1: v, controls: &self.controls, prepared: &[], definite: false };
         self.dof.prepare(&at, &mut prepared);
         self.dof.stored_energy(&LocalState { prepared: &prepared, ..at })
     }

@@ -103,6 +103,8 @@ pub struct LocalState<'a> {
     pub controls: &'a [f64],
     /// What [`Dof::prepare`] found for this tick.
     pub prepared: &'a [f64],
+    /// Whether second derivatives have to be positive semidefinite: the sum over everything turned out not to be.
+    pub definite: bool,
 }
 
 /// A kind of DOF with everything about one body of that kind that does not change.
@@ -191,12 +193,20 @@ pub trait Dof: Send + Sync {
         self.energy(at, &mut vec![0.0; at.v1.len()])
     }
 
-    /// Hands `add` the positive semidefinite second derivative of [`Dof::energy`]: (row block, column block, entries) for
-    /// the diagonal and the pairs with row > column.
+    /// Hands `add` the second derivative of [`Dof::energy`]: (row block, column block, entries) for the diagonal and the
+    /// pairs with row > column. It is positive semidefinite where that is asked for ([`LocalState::definite`]); else the
+    /// derivative as it is serves Newton better where the sum with inertia and neighbours is definite all the same.
+    ///
+    /// Kinds with [`Inertia::Points`] answer [`Dof::point_stiffness`] instead.
     fn stiffness(&self, _at: &LocalState, _add: &mut dyn FnMut(usize, usize, &RateBlock)) {}
 
-    /// Hands `couple` every pair of different blocks that [`Dof::stiffness`] may answer.
+    /// Hands `couple` every pair of different blocks that [`Dof::stiffness`] may answer, the same pairs at all times.
     fn couplings(&self, _couple: &mut dyn FnMut(usize, usize)) {}
+
+    /// The second derivative as of [`Dof::stiffness`], for [`Inertia::Points`] alone, N/m: adds the blocks of each point
+    /// with itself to `own`, those of each pair in [`PointMasses::off_diagonal`] to `pairs`. What a pair without common
+    /// mass is coupled by needs an entry of zero there.
+    fn point_stiffness(&self, _at: &LocalState, _own: &mut [DMat3], _pairs: &mut [DMat3]) {}
 }
 
 impl PointMasses {

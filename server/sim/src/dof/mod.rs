@@ -4,7 +4,9 @@
 //! (what pushes it; those live in [`potential`](crate::potential)). One file a kind.
 
 pub mod articulated;
+mod embedding;
 mod figure;
+pub mod finite_elements;
 mod frame;
 mod interface;
 pub(crate) mod particle;

@@ -20,9 +20,15 @@ pub(super) struct ConjugateGradient<const D: usize> {
     preconditioned: Vec<Entry<D>>,
     direction: Vec<Entry<D>>,
     product: Vec<Entry<D>>,
+    met_negative_curvature: bool,
 }
 
 impl<const D: usize> ConjugateGradient<D> {
+    /// Whether the last matrix was found not to be positive definite.
+    pub fn met_negative_curvature(&self) -> bool {
+        self.met_negative_curvature
+    }
+
     /// Solves A x = −g, with a preconditioner that was prepared for A, until the preconditioned residual has shrunk to
     /// `forcing`, to the cap, to a direction of negative curvature, or until the budget has run out. Answers the number
     /// of iterations.
@@ -40,6 +46,7 @@ impl<const D: usize> ConjugateGradient<D> {
     ) -> usize {
         let cap = iteration_cap(D * g.len());
         let iteration_work = a.multiply_work() + preconditioner.apply_work(a);
+        self.met_negative_curvature = false;
         x.clear();
         x.resize(g.len(), [0.0; D]);
         self.residual.clear();
@@ -62,6 +69,7 @@ impl<const D: usize> ConjugateGradient<D> {
             let curvature = inner(&self.direction, &self.product);
             let convex = curvature > 0.0;
             if !convex {
+                self.met_negative_curvature = true;
                 return self.stop_early(iteration, x);
             }
             let alpha = rho / curvature;

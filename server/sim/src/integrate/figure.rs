@@ -7,7 +7,9 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::block::{Block, Entry};
-use crate::dof::{Columns, Dof, FigureBody, Frame, Inertia, LocalState, PartInertia, PartLoad, PartPoint, Twist};
+use crate::dof::{
+    Columns, Dof, FigureBody, Frame, Inertia, LocalState, PartInertia, PartLoad, PartPoint, PointMasses, Twist,
+};
 use crate::potential::Wrench;
 
 /// A body of a general kind in an island.
@@ -31,6 +33,18 @@ pub(crate) struct Figure {
     loads: Vec<PartLoad>,
     /// Stiffness of each part against turns that comes from its loads, N m s.
     geometric: Vec<DMat3>,
+    /// Of points: stiffness of each by itself and of each pair of the mass matrix, N/m.
+    own_stiffness: Vec<DMat3>,
+    pair_stiffness: Vec<DMat3>,
+}
+
+/// Takes blocks of a symmetric matrix.
+pub(crate) trait Blocks {
+    /// Adds at (row, column), row not above column; (column, row) is its transpose.
+    fn add(&mut self, row: u32, column: u32, block: &Block<6>);
+
+    /// The same for a block of points: `block` and `mass` times the identity.
+    fn add_point(&mut self, row: u32, column: u32, block: &DMat3, mass: f64);
 }
 
 /// A material point of a figure at which something acts: one more frame of the island.
@@ -66,6 +80,8 @@ pub(crate) struct Figures {
     influences: Vec<Influence>,
     /// Gradient on each attachment.
     wrenches: Vec<Wrench>,
+    /// Whether the figures' second derivatives have to be positive semidefinite.
+    definite: bool,
 }
 
 impl Figures {
@@ -73,6 +89,14 @@ impl Figures {
         self.used = 0;
         self.attachments.clear();
         self.influences.clear();
+        self.definite = false;
+    }
+
+    /// From now on second derivatives are positive semidefinite. Answers whether that changes anything.
+    pub fn require_definite(&mut self) -> bool {
+        let changes = !self.definite && self.used > 0;
+        self.definite = true;
+        changes
     }
 
     pub fn list(&self) -> &[Figure] {
@@ -181,29 +205,29 @@ impl Figures {
         energy
     }
 
-    /// Hands `add` the blocks of the figures' inertia and of their own potentials: (row, column, entries), rows not
-    /// above columns.
-    pub fn assemble(&mut self, dt: f64, frames: &[Frame<f64>], add: &mut impl FnMut(u32, u32, &Block<6>)) {
+    /// Hands over the blocks of the figures' inertia and of their own potentials.
+    pub fn assemble(&mut self, dt: f64, frames: &[Frame<f64>], blocks: &mut impl Blocks) {
         let attached = &frames[frames.len() - self.attachments.len()..];
         for (index, figure) in (0..).zip(&mut self.list[..self.used]) {
             figure.load(index, &self.attachments, &self.wrenches, attached);
+            figure.stiffen_points(dt, self.definite);
         }
         for figure in self.list() {
             match figure.dof.inertia() {
-                Inertia::Points(masses) => figure.assemble_points(masses, add),
+                Inertia::Points(masses) => figure.assemble_points(masses, dt * dt, blocks),
                 Inertia::Parts(parts) => {
                     let all = (figure.parts.start as usize..).zip(parts).zip(&figure.geometric);
                     for ((k, part), &geometric) in all {
                         let turning = world_inertia(&attached[k], part.inertia) + geometric * dt;
-                        self.assemble_part(k, part.mass, turning, add);
+                        self.assemble_part(k, part.mass, turning, blocks);
                     }
+                    figure.assemble_stiffness(dt, self.definite, blocks);
                 }
             }
-            figure.assemble_stiffness(dt, add);
         }
     }
 
-    fn assemble_part(&self, k: usize, mass: f64, inertia: DMat3, add: &mut impl FnMut(u32, u32, &Block<6>)) {
+    fn assemble_part(&self, k: usize, mass: f64, inertia: DMat3, blocks: &mut impl Blocks) {
         let mut tensor = [[0.0; 6]; 6];
         for i in 0..3 {
             tensor[i][i] = mass;
@@ -212,7 +236,7 @@ impl Figures {
         let influences = self.influences(k);
         for a in influences {
             for b in influences.iter().filter(|b| b.block <= a.block) {
-                add(a.block, b.block, &pulled_back(&a.columns, &tensor, &b.columns));
+                blocks.add(a.block, b.block, &pulled_back(&a.columns, &tensor, &b.columns));
             }
         }
     }
@@ -230,6 +254,16 @@ impl Figures {
                 for (i, a) in influences.iter().enumerate() {
                     influences[..i].iter().for_each(|b| pair(a.block, b.block));
                 }
+            }
+        }
+    }
+
+    /// Hands `pair` the two blocks of every pair of points, in the order in which [`Figures::assemble`] adds them.
+    pub fn point_pairs(&self, pair: &mut impl FnMut(u32, u32)) {
+        for figure in self.list() {
+            if let Inertia::Points(masses) = figure.dof.inertia() {
+                let blocks = &figure.blocks;
+                masses.off_diagonal.iter().for_each(|&(a, b, _)| pair(blocks[a as usize], blocks[b as usize]));
             }
         }
     }
@@ -252,6 +286,8 @@ impl Figure {
             free_momenta: Vec::new(),
             loads: Vec::new(),
             geometric: Vec::new(),
+            own_stiffness: Vec::new(),
+            pair_stiffness: Vec::new(),
         }
     }
 
@@ -274,7 +310,7 @@ impl Figure {
     fn prepare(&mut self, dt: f64) {
         let mut prepared = std::mem::take(&mut self.prepared);
         prepared.clear();
-        self.dof.prepare(&self.local_state(dt), &mut prepared);
+        self.dof.prepare(&self.local_state(dt, false), &mut prepared);
         self.prepared = prepared;
     }
 
@@ -296,9 +332,9 @@ impl Figure {
         }
     }
 
-    fn local_state(&self, dt: f64) -> LocalState<'_> {
+    fn local_state(&self, dt: f64, definite: bool) -> LocalState<'_> {
         let Self { q0, v0, q1, v1, controls, prepared, .. } = self;
-        LocalState { dt, q0, v0, q1, v1, controls, prepared }
+        LocalState { dt, q0, v0, q1, v1, controls, prepared, definite }
     }
 
     fn move_to<const D: usize>(&mut self, u: &[Entry<D>], dt: f64, frames: &mut [Frame<f64>]) {
@@ -328,7 +364,7 @@ impl Figure {
         let mut gradient = std::mem::take(&mut self.gradient);
         gradient.clear();
         gradient.resize(self.v1.len(), 0.0);
-        let mut energy = self.dof.energy(&self.local_state(dt), &mut gradient);
+        let mut energy = self.dof.energy(&self.local_state(dt, false), &mut gradient);
         for (block, rates) in self.shares() {
             for (entry, g) in residual[block].iter_mut().zip(&gradient[rates]) {
                 *entry += dt * g;
@@ -353,12 +389,7 @@ impl Figure {
     }
 
     /// M (v1 − v0 − g dt), and half its product with that difference.
-    fn evaluate_points<const D: usize>(
-        &self,
-        masses: &crate::dof::PointMasses,
-        fall: DVec3,
-        residual: &mut [Entry<D>],
-    ) -> f64 {
+    fn evaluate_points<const D: usize>(&self, masses: &PointMasses, fall: DVec3, residual: &mut [Entry<D>]) -> f64 {
         let change = |i: usize| DVec3::from_slice(&self.v1[3 * i..]) - DVec3::from_slice(&self.v0[3 * i..]) - fall;
         let mut energy = 0.0;
         let mut add = |i: usize, momentum: DVec3| {
@@ -392,24 +423,33 @@ impl Figure {
         dof.geometric_stiffness(q1, centres, loads, &mut |part, stiffness| geometric[part] += stiffness);
     }
 
-    fn assemble_points(&self, masses: &crate::dof::PointMasses, add: &mut impl FnMut(u32, u32, &Block<6>)) {
-        let mut block = [[0.0; 6]; 6];
-        let mut scaled = |m: f64| {
-            (0..3).for_each(|k| block[k][k] = m);
-            block
-        };
-        for (i, &m) in masses.diagonal.iter().enumerate() {
-            add(self.blocks[i], self.blocks[i], &scaled(m));
+    /// Finds the stiffness of points.
+    fn stiffen_points(&mut self, dt: f64, definite: bool) {
+        let Inertia::Points(masses) = self.dof.inertia() else { return };
+        let sizes = [masses.diagonal.len(), masses.off_diagonal.len()];
+        let (mut own, mut pairs) = (std::mem::take(&mut self.own_stiffness), std::mem::take(&mut self.pair_stiffness));
+        for (blocks, size) in [&mut own, &mut pairs].into_iter().zip(sizes) {
+            blocks.clear();
+            blocks.resize(size, DMat3::ZERO);
         }
-        for &(i, j, m) in &masses.off_diagonal {
-            add(self.blocks[i as usize], self.blocks[j as usize], &scaled(m));
+        self.dof.point_stiffness(&self.local_state(dt, definite), &mut own, &mut pairs);
+        (self.own_stiffness, self.pair_stiffness) = (own, pairs);
+    }
+
+    fn assemble_points(&self, masses: &PointMasses, factor: f64, blocks: &mut impl Blocks) {
+        for ((&block, &m), stiffness) in self.blocks.iter().zip(&masses.diagonal).zip(&self.own_stiffness) {
+            blocks.add_point(block, block, &(*stiffness * factor), m);
+        }
+        for (&(i, j, m), stiffness) in masses.off_diagonal.iter().zip(&self.pair_stiffness) {
+            let [row, column] = [i, j].map(|i| self.blocks[i as usize]);
+            blocks.add_point(row, column, &(*stiffness * factor), m);
         }
     }
 
-    fn assemble_stiffness(&self, dt: f64, add: &mut impl FnMut(u32, u32, &Block<6>)) {
-        self.dof.stiffness(&self.local_state(dt), &mut |row, column, block| {
+    fn assemble_stiffness(&self, dt: f64, definite: bool, blocks: &mut impl Blocks) {
+        self.dof.stiffness(&self.local_state(dt, definite), &mut |row, column, block| {
             let scaled = block.map(|r| r.map(|x| x * dt * dt));
-            add(self.blocks[row], self.blocks[column], &scaled);
+            blocks.add(self.blocks[row], self.blocks[column], &scaled);
         });
     }
 }

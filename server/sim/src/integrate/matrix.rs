@@ -4,9 +4,11 @@
 //! factorisations. Stored are the diagonal and the lower triangle, row by row, columns ascending.
 
 use super::block::{Block, Entry, multiply_add, transposed_multiply_add, zero};
-use super::figure::{Figures, pulled_back};
+use super::figure::{Blocks, Figures, pulled_back};
 use super::problem::{Problem, Unknown, Visitor, pair};
 use super::solver::work::block;
+use glam::DMat3;
+
 use crate::dof::{Columns, Frame};
 use crate::potential::{FIXED, FrameIndex, PairBlocks, Term};
 
@@ -24,6 +26,8 @@ pub(super) struct Matrix<const D: usize> {
     pub lower: Vec<Block<D>>,
     /// Off-diagonal block of each term, in the order of visits.
     slots: Vec<u32>,
+    /// Off-diagonal block of each pair of points, in the order of [`Figures::point_pairs`].
+    point_slots: Vec<u32>,
     pairs: Vec<(u32, u32)>,
 }
 
@@ -49,6 +53,11 @@ impl<const D: usize> Matrix<D> {
         }
         self.slots.clear();
         terms.visit(&mut Slots { blocks: n, rows: &self.rows, columns: &self.columns, slots: &mut self.slots });
+        self.point_slots.clear();
+        let Self { rows, columns, point_slots, .. } = self;
+        figures.point_pairs(&mut |a, b| {
+            point_slots.push(slot(rows, columns, (a.max(b), a.min(b))).unwrap_or(NONE));
+        });
         self.diagonal.resize(n, zero());
         self.lower.resize(self.columns.len(), zero());
     }
@@ -63,7 +72,9 @@ impl<const D: usize> Matrix<D> {
         let mut slots = std::mem::take(&mut self.slots);
         terms.visit(&mut Assemble { dt: *dt, frames, figures, matrix: self, slots: slots.iter() });
         std::mem::swap(&mut self.slots, &mut slots);
-        figures.assemble(*dt, frames, &mut |row, column, block| self.add(row, column, block, 1.0));
+        let point_slots = std::mem::take(&mut self.point_slots);
+        figures.assemble(*dt, frames, &mut OfFigures { matrix: self, point_slots: point_slots.iter() });
+        self.point_slots = point_slots;
     }
 
     /// Adds the leading part of `factor` × `block` at (row, column), or its transpose where that is the stored half.
@@ -189,6 +200,39 @@ impl Visitor for Slots<'_> {
             let slot = place(term.frames(), self.blocks).and_then(|place| slot(self.rows, self.columns, place));
             self.slots.push(slot.unwrap_or(NONE));
         }
+    }
+}
+
+/// Takes what figures add.
+struct OfFigures<'a, const D: usize> {
+    matrix: &'a mut Matrix<D>,
+    point_slots: std::slice::Iter<'a, u32>,
+}
+
+impl<const D: usize> Blocks for OfFigures<'_, D> {
+    fn add(&mut self, row: u32, column: u32, block: &Block<6>) {
+        self.matrix.add(row, column, block, 1.0);
+    }
+
+    fn add_point(&mut self, row: u32, column: u32, block: &DMat3, mass: f64) {
+        let block = block.to_cols_array_2d();
+        if row == column {
+            return add_block_of_points(&mut self.matrix.diagonal[row as usize], &block, mass, true);
+        }
+        if let Some(target) = self.point_slots.next().and_then(|&slot| self.matrix.lower.get_mut(slot as usize)) {
+            // Columns are the rows of the transpose.
+            add_block_of_points(target, &block, mass, row > column);
+        }
+    }
+}
+
+/// target += source + mass, or of the transpose of source.
+fn add_block_of_points<const D: usize>(target: &mut Block<D>, source: &Block<3>, mass: f64, transposed: bool) {
+    for i in 0..3 {
+        for j in 0..3 {
+            target[i][j] += if transposed { source[j][i] } else { source[i][j] };
+        }
+        target[i][i] += mass;
     }
 }
 

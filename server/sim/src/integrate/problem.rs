@@ -1,9 +1,9 @@
 //! One island: its unknowns, its potentials, and the residual that a solver makes zero.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
-use super::block::Entry;
-use super::figure::Figures;
+use super::block::{Block, Entry};
+use super::figure::{Blocks, Figures};
 use crate::autodiff::Dual;
 use crate::dof::{BLOCK_RATES_MAX, Frame, Node, Twist};
 use crate::potential::axle::AxleTerm;
@@ -222,15 +222,7 @@ impl Problem {
         let Self { dt, unknowns, terms, figures, frames, .. } = self;
         y.clear();
         y.extend(unknowns.iter().zip(x).map(|(unknown, x)| unknown.inertia_product(x)));
-        figures.assemble(*dt, frames, &mut |row, column, block| {
-            let (row, column) = (row as usize, column as usize);
-            for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
-                y[row][i] += block[i][j] * x[column][j];
-                if row != column {
-                    y[column][j] += block[i][j] * x[row][i];
-                }
-            }
-        });
+        figures.assemble(*dt, frames, &mut TimesVector { x, y });
         let along = Propose { step: x, figures, dt: *dt };
         let moving: Vec<_> =
             (0..).zip(frames.iter()).map(|(i, frame)| frame.along([along.displacement(i)], *dt)).collect();
@@ -247,6 +239,12 @@ impl Problem {
                 }
             }
         }
+    }
+
+    /// From now on the figures' second derivatives are positive semidefinite, as the terms' always are. Answers whether
+    /// that changes anything.
+    pub(super) fn require_definite(&mut self) -> bool {
+        self.figures.require_definite()
     }
 
     /// v ← M⁻¹ p, rates out of momenta. Of figures, M is the diagonal.
@@ -296,6 +294,37 @@ impl Problem {
 /// Frames of a term.
 pub(super) fn pair<'a, T: Term>(frames: &'a [Frame<f64>], term: &T) -> [&'a Frame<f64>; 2] {
     term.frames().map(|i| frames.get(i as usize).unwrap_or(&Frame::WORLD))
+}
+
+/// Multiplies the blocks of figures with a vector.
+struct TimesVector<'a, const D: usize> {
+    x: &'a [Entry<D>],
+    y: &'a mut [Entry<D>],
+}
+
+impl<const D: usize> TimesVector<'_, D> {
+    fn add_entry(&mut self, row: u32, column: u32, (i, j): (usize, usize), entry: f64) {
+        let (row, column) = (row as usize, column as usize);
+        self.y[row][i] += entry * self.x[column][j];
+        if row != column {
+            self.y[column][j] += entry * self.x[row][i];
+        }
+    }
+}
+
+impl<const D: usize> Blocks for TimesVector<'_, D> {
+    fn add(&mut self, row: u32, column: u32, block: &Block<6>) {
+        for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+            self.add_entry(row, column, (i, j), block[i][j]);
+        }
+    }
+
+    fn add_point(&mut self, row: u32, column: u32, block: &DMat3, mass: f64) {
+        for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+            let mass = if i == j { mass } else { 0.0 };
+            self.add_entry(row, column, (i, j), block.col(j)[i] + mass);
+        }
+    }
 }
 
 struct Evaluate<'a, const D: usize> {

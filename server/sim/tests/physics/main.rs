@@ -4,6 +4,7 @@ mod articulated;
 mod closed_form;
 mod collisions;
 mod determinism;
+mod elasticity;
 mod hostile;
 mod joints;
 mod own_kind;

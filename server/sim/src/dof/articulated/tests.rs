@@ -181,7 +181,7 @@ proptest! {
         let v1: Vec<_> = v0.iter().map(|v| v * 3.0 + 0.5).collect();
         let (mut q1, mut prepared, controls) = (q0.clone(), Vec::new(), figure.controls());
         figure.step(&q0, &v1, DT, &mut q1);
-        let at = LocalState { dt: DT, q0: &q0, v0: &v0, q1: &q1, v1: &v1, controls: &controls, prepared: &[] };
+        let at = LocalState { dt: DT, q0: &q0, v0: &v0, q1: &q1, v1: &v1, controls: &controls, prepared: &[], definite: true };
         figure.prepare(&at, &mut prepared);
         let at = LocalState { prepared: &prepared, ..at };
         let (_, gradient, hessian) = potentials(&figure, &at, 0, 0.0);

@@ -30,8 +30,7 @@ impl<const D: usize> Solver<D> for Auto<D> {
             self.direct = self.newton.analyse(at.matrix) <= truncated_work(at.matrix);
         }
         if self.direct {
-            self.newton.factorise(at.matrix, at.work);
-            self.newton.solve(at.residual, at.work, step);
+            self.newton.descend(&mut at, step);
             1
         } else {
             self.truncated.solve(at, Preconditioner::IncompleteFactorization, step)

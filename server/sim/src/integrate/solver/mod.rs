@@ -72,6 +72,17 @@ impl<const D: usize> Standpoint<'_, D> {
         self.matrix.assemble(self.problem);
         self.work.assembled();
     }
+
+    /// Assembles again, a matrix that is definite, after the first turned out not to be. Answers whether there is
+    /// another one; it stays definite for the rest of the solve.
+    pub fn assemble_definite(&mut self) -> bool {
+        let changes = self.problem.require_definite();
+        if changes {
+            self.matrix.assemble(self.problem);
+            self.work.assembled();
+        }
+        changes
+    }
 }
 
 /// Why a solver stopped.

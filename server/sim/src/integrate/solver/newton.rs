@@ -29,6 +29,14 @@ impl<const D: usize> Newton<D> {
         breakdowns
     }
 
+    /// step ← −A⁻¹ R with the matrix as it is assembled; with a definite one if it is not.
+    pub fn descend(&mut self, at: &mut Standpoint<D>, step: &mut Vec<Entry<D>>) {
+        if self.factorise(at.matrix, at.work) > 0 && at.assemble_definite() {
+            self.factorise(at.matrix, at.work);
+        }
+        self.solve(at.residual, at.work, step);
+    }
+
     /// step ← −A⁻¹ R.
     pub fn solve(&self, residual: &[Entry<D>], work: &mut Work, step: &mut Vec<Entry<D>>) {
         negate(residual, step);
@@ -44,8 +52,7 @@ impl<const D: usize> Solver<D> for Newton<D> {
         if at.iteration == 0 {
             self.analyse(at.matrix);
         }
-        self.factorise(at.matrix, at.work);
-        self.solve(at.residual, at.work, step);
+        self.descend(&mut at, step);
         1
     }
 }

@@ -16,11 +16,19 @@ pub(super) struct TruncatedNewton<const D: usize> {
 
 impl<const D: usize> TruncatedNewton<D> {
     /// Almost solves with the matrix as it is assembled, with a preconditioner of `kind`.
-    pub fn solve(&mut self, at: Standpoint<D>, kind: Preconditioner, step: &mut Vec<Entry<D>>) -> usize {
+    pub fn solve(&mut self, mut at: Standpoint<D>, kind: Preconditioner, step: &mut Vec<Entry<D>>) -> usize {
         if at.iteration == 0 {
             self.preconditioner.select(kind, at.settings.relaxation);
             self.preconditioner.analyse(at.matrix);
         }
+        let iterations = self.try_to_solve(&mut at, step);
+        if self.linear.met_negative_curvature() && at.assemble_definite() {
+            return iterations + self.try_to_solve(&mut at, step);
+        }
+        iterations
+    }
+
+    fn try_to_solve(&mut self, at: &mut Standpoint<D>, step: &mut Vec<Entry<D>>) -> usize {
         at.work.add(self.preconditioner.prepare(at.matrix));
         self.linear.solve(at.matrix, &self.preconditioner, at.residual, at.settings.forcing, at.work, step)
     }

@@ -18,7 +18,7 @@ pub use tetrahedron::{Curvature, NODE_PAIRS, NodeBlocks, Tetrahedron};
 use crate::autodiff::{Mat3, Scalar};
 use crate::error::{SimError, require};
 use guard::{Stretched, is_positive};
-use principal::Principal;
+pub(crate) use principal::Principal;
 
 /// A Saint Venant-Kirchhoff material by its Lamé constants, Pa.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use crate::eigen::symmetric_eigen;
 
 /// A deformation gradient taken apart.
-pub(super) struct Principal {
+pub(crate) struct Principal {
     /// Rotation: principal directions in the world.
     pub u: DMat3,
     /// Stretches, largest first. The last, smallest in magnitude, is negative where the element is turned inside out.

@@ -77,6 +77,47 @@ impl Tetrahedron {
         }
     }
 
+    /// Gradients of the nodes' shape functions in rest coordinates, 1/m.
+    pub fn gradients(&self) -> [DVec3; 4] {
+        let [b, c, d] = self.gradients;
+        [-(b + c + d), b, c, d]
+    }
+
+    /// What damping takes on the way from nodes at `before` to nodes at `x`, J, and its gradient at `x`, N: the energy of
+    /// the change of strain in `viscosity`, the material times the damping's time constant over the tick. It is a
+    /// potential of `x`, nothing for turns, and not guarded: whatever the change of strain, it is resisted.
+    pub fn damping_and_gradient(&self, viscosity: &Elastic, before: [DVec3; 4], x: [DVec3; 4]) -> (f64, [DVec3; 4]) {
+        let (f, change) = self.change_of_strain(before, x);
+        let stress = viscosity.second_stress(&change);
+        let work: f64 = (0..3).map(|i| change.columns[i].dot(stress.columns[i])).sum();
+        let (energy, stress) = (0.5 * work * self.volume, f * stress.value());
+        let [b, c, d] = self.gradients.map(|g| stress * g * self.volume);
+        (energy, [-(b + c + d), b, c, d])
+    }
+
+    /// Second derivative of that energy, N/m.
+    pub fn damping_stiffness(
+        &self,
+        viscosity: &Elastic,
+        before: [DVec3; 4],
+        x: [DVec3; 4],
+        curvature: Curvature,
+    ) -> NodeBlocks {
+        let (f, change) = self.change_of_strain(before, x);
+        let stress = match curvature {
+            Curvature::Natural => viscosity.second_stress(&change).value(),
+            // What is left without the stress is positive semidefinite.
+            Curvature::Definite => DMat3::ZERO,
+        };
+        self.unguarded_stiffness(viscosity, f, stress)
+    }
+
+    fn change_of_strain(&self, before: [DVec3; 4], x: [DVec3; 4]) -> (DMat3, Mat3<f64>) {
+        let f = self.deformation(x);
+        let (now, then) = (green_strain(&Mat3::constant(f)), green_strain(&Mat3::constant(self.deformation(before))));
+        (f, Mat3 { columns: [0, 1, 2].map(|i| now.columns[i] - then.columns[i]) })
+    }
+
     /// Deformation gradient with nodes at `x`.
     pub(super) fn deformation(&self, x: [DVec3; 4]) -> DMat3 {
         let [a, b, c] = [x[1] - x[0], x[2] - x[0], x[3] - x[0]];

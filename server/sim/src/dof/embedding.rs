@@ -1,0 +1,108 @@
+//! Points of a body that is embedded in nodes: a place is Σ Nᵢ xᵢ, its axes turn as the polar decomposition of the
+//! deformation gradient F = Σ xᵢ ⊗ ∇Nᵢ does, F = R S.
+//!
+//! Shared by finite elements and lattices; knows neither.
+
+use glam::{DMat3, DVec3};
+
+use super::{Columns, Frame};
+use crate::potential::cross_matrix;
+use crate::potential::elasticity::Principal;
+
+/// Least sum of two stretches by which a turn is divided: where an element that is inside out is as long as it is wide,
+/// its axes may turn at any speed.
+const LEAST_SUM: f64 = 0.1;
+
+/// A material point between N nodes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Embedding<const N: usize> {
+    /// Nᵢ at the point; they sum up to 1.
+    pub weights: [f64; N],
+    /// ∇Nᵢ there in rest coordinates, 1/m; they sum up to 0.
+    pub gradients: [DVec3; N],
+}
+
+impl<const N: usize> Embedding<N> {
+    /// The frame at the point, with nodes at `x` that move at `v`.
+    pub fn frame(&self, x: &[DVec3; N], v: &[DVec3; N]) -> Frame<f64> {
+        let (rotation, turns) = self.turns(x);
+        let angular = turns.iter().zip(v).map(|(turn, &v)| *turn * v).sum();
+        Frame::new(self.mean(x), rotation, self.mean(v), angular)
+    }
+
+    /// The frame's derivatives with respect to the velocities of each node.
+    pub fn columns(&self, x: &[DVec3; N]) -> [Columns; N] {
+        let (_, turns) = self.turns(x);
+        std::array::from_fn(|node| {
+            let mut columns = Columns::default();
+            for (k, column) in columns.iter_mut().enumerate().take(3) {
+                column[k] = self.weights[node];
+                column[3..].copy_from_slice(&turns[node].col(k).to_array());
+            }
+            columns
+        })
+    }
+
+    fn mean(&self, of: &[DVec3; N]) -> DVec3 {
+        self.weights.iter().zip(of).map(|(&weight, &x)| weight * x).sum()
+    }
+
+    /// R, and for each node the matrix that makes of its velocity what it adds to R's angular velocity.
+    ///
+    /// R' = [ω]× R and the symmetry of S give ω = R (tr(S) − S)⁻¹ Rᵀ Σ (R ∇Nᵢ) × vᵢ; in principal axes the inverse
+    /// divides by sums of two stretches.
+    fn turns(&self, x: &[DVec3; N]) -> (DMat3, [DMat3; N]) {
+        let column = |k: usize| self.gradients.iter().zip(x).map(|(g, &x)| g[k] * x).sum();
+        let Principal { u, stretches: s, v } = Principal::of(DMat3::from_cols(column(0), column(1), column(2)));
+        let rotation = u * v.transpose();
+        let sums = DVec3::new(s.y + s.z, s.z + s.x, s.x + s.y).max(DVec3::splat(LEAST_SUM));
+        let yielding = u * DMat3::from_diagonal(sums.recip()) * u.transpose();
+        (rotation, self.gradients.map(|g| yielding * cross_matrix(rotation * g)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+    use proptest::array::{uniform3, uniform4};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::dof::Twist;
+
+    proptest! {
+        /// Position and rotation move as velocity and angular velocity say, squeezed and inside out too; and the columns
+        /// are the frame's derivatives.
+        #[test]
+        fn frames_move_as_they_say(
+            x in uniform4(uniform3(-1.0..1.0f64)),
+            v in uniform4(uniform3(-1.0..1.0f64)),
+            weights in uniform3(-0.5..1.0f64),
+        ) {
+            let (x, v) = (x.map(DVec3::from_array), v.map(DVec3::from_array));
+            let f = DMat3::from_cols(x[1] - x[0], x[2] - x[0], x[3] - x[0]);
+            let s = Principal::of(f).stretches;
+            prop_assume!(s.y + s.z > 1.5 * LEAST_SUM);
+            let [a, b, c] = weights;
+            let gradients = [-DVec3::ONE, DVec3::X, DVec3::Y, DVec3::Z];
+            let point = Embedding { weights: [1.0 - a - b - c, a, b, c], gradients };
+            let Twist { linear, angular } = point.frame(&x, &v).twist();
+            let step = 1e-6;
+            let at = |h: f64| point.frame(&std::array::from_fn(|i| x[i] + h * v[i]), &v);
+            let (before, after) = (at(-step), at(step));
+            let moved = DVec3::from(after.position) - DVec3::from(before.position);
+            prop_assert!((moved / (2.0 * step) - linear).length() < 1e-8);
+            let turn = DQuat::from_mat3(&(after.rotation.value() * before.rotation.value().transpose()));
+            let error = turn.to_scaled_axis() / (2.0 * step) - angular;
+            prop_assert!(error.length() < 1e-6 * (1.0 + angular.length() / s.z.abs().max(1e-2)), "{error}");
+            let mut sum = [0.0; 6];
+            for (columns, v) in point.columns(&x).iter().zip(v) {
+                for (column, v) in columns.iter().zip(v.to_array()) {
+                    (0..6).for_each(|i| sum[i] += column[i] * v);
+                }
+            }
+            let error = (DVec3::from_slice(&sum) - linear).length() + (DVec3::from_slice(&sum[3..]) - angular).length();
+            prop_assert!(error < 1e-12 * (1.0 + angular.length()));
+        }
+    }
+}
