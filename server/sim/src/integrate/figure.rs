@@ -169,6 +169,11 @@ impl Figures {
         }
     }
 
+    /// Whether one of the figures is made of parts.
+    pub fn have_parts(&self) -> bool {
+        self.list().iter().any(|figure| !figure.parts.is_empty())
+    }
+
     /// Forgets the gradient on attachments.
     pub fn begin_gradient(&mut self) {
         self.wrenches.clear();

@@ -5,11 +5,11 @@ use glam::DVec3;
 use super::problem::{Rates, Unknown};
 use super::step::{Integrator, Scene, Solve};
 use crate::collide::{ContactPoint, Partner};
-use crate::dof::{ABSENT, BLOCK_RATES_MAX, BodyId, FigureBody, Frame, Inertia, Node, PartPoint, Placed};
+use crate::dof::{ABSENT, BLOCK_RATES_MAX, BodyId, FigureBody, Frame, Inertia, Node, PartPoint, Placed, Twist};
 use crate::island::Place;
 use crate::potential::axle::AxleTerm;
 use crate::potential::ball_joint::BallJointTerm;
-use crate::potential::contact::ContactTerm;
+use crate::potential::contact::{Approach, ContactTerm};
 use crate::potential::hold::{Held, STRONGEST, Scale};
 use crate::potential::pd::PdTerm;
 use crate::potential::rod::RodTerm;
@@ -257,9 +257,12 @@ impl Integrator {
             let Some((solve, ends)) = self.localise(spots, true) else { continue };
             let frames = ends.map(|end| end.frame);
             let arms = ends.map(|end| solve.arm(end, contact.position));
-            let speeds = [0, 1].map(|i| solve.start(ends[i]).twist().at(arms[i]));
-            let closing = contact.normal.dot(speeds[0] - speeds[1]);
-            let term = ContactTerm::new(frames, contact, arms, solve.reduced_mass(ends), closing, settings, *dt);
+            let closing = |speed: [DVec3; 2]| contact.normal.dot(speed[0] - speed[1]);
+            let approach = Approach {
+                now: closing([0, 1].map(|i| solve.start(ends[i]).twist().at(arms[i]))),
+                free: closing([0, 1].map(|i| solve.free_twist(ends[i]).at(arms[i]))),
+            };
+            let term = ContactTerm::new(frames, contact, arms, solve.reduced_mass(ends), approach, settings, *dt);
             solve.problem.terms.contacts.push(term);
             solve.contacts.push(source);
         }
@@ -283,6 +286,11 @@ impl Solve {
         let attachment = (end.frame as usize).checked_sub(self.problem.len());
         let attachment = attachment.and_then(|k| self.problem.figures.attachments.get(k));
         attachment.map_or(Frame::WORLD, |attachment| attachment.start)
+    }
+
+    /// The twist of an end at the end of the tick if nothing acts on its body but gravity.
+    fn free_twist(&self, end: End) -> Twist {
+        self.node(end.frame).map_or_else(|| self.start(end).twist(), |node| node.target)
     }
 
     /// What resists a force at an end, kg; infinite for the world.

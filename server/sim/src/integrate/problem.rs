@@ -74,6 +74,9 @@ pub(crate) struct Rates {
     pub body_mass: f64,
 }
 
+/// Below this a body is taken for resting when a start is guessed, m/s and rad/s. It decides the order of guesses alone.
+const RESTING_SPEED: f64 = 1e-2;
+
 /// Where a solver may start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Guess {
@@ -87,11 +90,6 @@ pub(super) enum Guess {
     Repeated,
 }
 
-impl Guess {
-    /// What rests or moves evenly is solved by the first.
-    pub const ALL: [Self; 4] = [Self::Repeated, Self::Target, Self::Before, Self::Rest];
-}
-
 impl Unknown {
     fn guess<const D: usize>(&self, guess: Guess) -> Entry<D> {
         match (self, guess) {
@@ -103,6 +101,17 @@ impl Unknown {
             (Self::Rates(rates), Guess::Before) => leading(&rates.before),
             (Self::Rates(_), Guess::Rest) => [0.0; D],
             (Self::Rates(rates), Guess::Repeated) => leading(&rates.repeated),
+        }
+    }
+
+    /// Whether it hardly moved at the start of the tick.
+    fn rests(&self) -> bool {
+        match self {
+            Self::Body(node) => {
+                let Twist { linear, angular } = node.before;
+                linear.length_squared().max(angular.length_squared()) < RESTING_SPEED * RESTING_SPEED
+            }
+            Self::Rates(rates) => rates.before.iter().all(|rate| rate.abs() < RESTING_SPEED),
         }
     }
 
@@ -173,6 +182,19 @@ impl Problem {
     /// Blocks of unknowns.
     pub fn len(&self) -> usize {
         self.unknowns.len()
+    }
+
+    /// The guesses that are worth a look, most likely first. What rests goes on resting, what moves does again what it
+    /// did; only an impact makes a difference that the first iteration does not mend, and what figures of parts do to
+    /// themselves, at their joints' limits, is not seen from here.
+    pub(super) fn guesses(&self) -> &'static [Guess] {
+        if self.figures.have_parts() || self.terms.contacts.iter().any(ContactTerm::is_impact) {
+            &[Guess::Repeated, Guess::Before, Guess::Target, Guess::Rest]
+        } else if self.unknowns.iter().all(Unknown::rests) {
+            &[Guess::Rest, Guess::Repeated]
+        } else {
+            &[Guess::Repeated]
+        }
     }
 
     /// Replaces `u` by a guess.

@@ -22,6 +22,15 @@ const STIFFEST: f64 = 4e4;
 /// and 1: slope55 2.8, 1.9, 1.1; 16 cars 56, 54, 51; pile100 10.2, 7.1, 7.4; 100 sheep 261, 257, 268.
 const TANGENT_SHARE: f64 = 0.8;
 
+/// How fast a contact point closes, m/s.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Approach {
+    /// At the start of the tick.
+    pub now: f64,
+    /// At its end, if nothing but gravity acts.
+    pub free: f64,
+}
+
 /// A contact point in an island.
 #[derive(Clone, Debug)]
 pub(crate) struct ContactTerm {
@@ -45,6 +54,8 @@ pub(crate) struct ContactTerm {
     anchor: DVec3,
     /// Friction limit of this Newton iteration, N.
     limit: f64,
+    /// It hits in this tick, or nothing is known of how it bears its load.
+    is_impact: bool,
 }
 
 /// Normal force over stiffness and its integral at depth s: k (s²/w − s³/3w²) up to w, then a line.
@@ -82,19 +93,20 @@ fn friction_slope(x: f64) -> f64 {
 }
 
 impl ContactTerm {
-    /// `mass` is the reduced mass of the pair, kg; `closing_speed` how fast the point closes at the start, m/s.
+    /// `mass` is the reduced mass of the pair, kg.
     pub fn new(
         frames: [FrameIndex; 2],
         point: &crate::collide::ContactPoint,
         arms: [DVec3; 2],
         mass: f64,
-        closing_speed: f64,
+        approach: Approach,
         settings: &ContactSettings,
         dt: f64,
     ) -> Self {
         let unit = mass / (dt * dt);
         // Stopping what would get so deep takes a depth of overlap / stiffness: that shall not exceed the transition.
-        let overlap = closing_speed * dt - point.gap.max(0.0);
+        let overlap = approach.now * dt - point.gap.max(0.0);
+        let closes = point.gap - approach.free * dt < settings.transition;
         let stiffness = settings.normal_stiffness.max((overlap / settings.transition).min(STIFFEST));
         let start_gap = point.gap.max(-settings.recovery_speed * dt);
         Self {
@@ -109,7 +121,13 @@ impl ContactTerm {
             friction: point.friction,
             anchor: point.anchor,
             limit: point.friction * point.normal_force,
+            is_impact: overlap > settings.transition || (closes && point.normal_force == 0.0),
         }
+    }
+
+    /// Whether it hits in this tick, or nothing is known of how it bears its load.
+    pub fn is_impact(&self) -> bool {
+        self.is_impact
     }
 
     /// Displacement of b against a over the tick, m.

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::axle::AxleTerm;
 use super::ball_joint::BallJointTerm;
-use super::contact::ContactTerm;
+use super::contact::{Approach, ContactTerm};
 use super::hold::{Memory, Scale};
 use super::pd::PdTerm;
 use super::rod::RodTerm;
@@ -164,7 +164,7 @@ fn spring(points: [DVec3; 2], rest_length: f64, damping: f64, start_length: f64)
 fn contact(normal: DVec3, gap: f64, anchor: DVec3, arms: [DVec3; 2], normal_force: f64) -> ContactTerm {
     let mut point = ContactPoint::at(DVec3::ZERO, normal, gap, 0.7);
     (point.anchor, point.normal_force) = (anchor - normal * normal.dot(anchor), normal_force);
-    ContactTerm::new([0, 1], &point, arms, 2.0, 0.0, &ContactSettings::default(), DT)
+    ContactTerm::new([0, 1], &point, arms, 2.0, Approach::default(), &ContactSettings::default(), DT)
 }
 
 proptest! {

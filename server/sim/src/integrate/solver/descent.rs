@@ -24,6 +24,10 @@ const VECTORS_A_TRIAL: u64 = 3;
 /// that it meets for the first time.
 const STIFFENING_ROUNDS: usize = 6;
 
+/// Share of the tolerance that a guess must be within to be taken as it is. The error of an iterate has any sign, that
+/// of a repeated guess repeats: it makes what slides slide too slowly by the tolerance in every tick.
+const GUESS_SHARE: f64 = 0.3;
+
 /// The state of a solve, kept from solve to solve for its memory.
 #[derive(Default)]
 pub(super) struct Descent<const D: usize> {

@@ -1,11 +1,11 @@
 //! The starting guess.
 
 use super::super::block::Entry;
-use super::super::problem::{Guess, Problem};
+use super::super::problem::Problem;
 use super::work::Work;
 use crate::settings::SolverSettings;
 
-/// Moves `u` and the trial to the first guess if it is within the tolerance as it is, else to the cheapest in
+/// Moves `u` and the trial to the first of the guesses that is within the tolerance as it is, else to the cheapest in
 /// incremental potential. `scratch` and `residual` are memory.
 pub(super) fn guess<const D: usize>(
     problem: &mut Problem,
@@ -16,19 +16,23 @@ pub(super) fn guess<const D: usize>(
     residual: &mut Vec<Entry<D>>,
 ) {
     let mut least = f64::NAN;
-    for (i, guess) in Guess::ALL.into_iter().enumerate() {
+    let mut is_last = true;
+    for &guess in problem.guesses() {
         problem.guess(guess, scratch);
         problem.move_to(scratch);
         let energy = problem.evaluate(residual);
         work.moved_and_evaluated();
-        if energy < least || least.is_nan() {
+        is_last = energy < least || least.is_nan();
+        if is_last {
             least = energy;
             std::mem::swap(u, scratch);
-        }
-        if i == 0 && problem.residual_speed(residual) <= settings.tolerance * problem.dt {
-            return;
+            if problem.residual_speed(residual) <= settings.tolerance * problem.dt {
+                return;
+            }
         }
     }
-    problem.move_to(u);
-    work.moved();
+    if !is_last {
+        problem.move_to(u);
+        work.moved();
+    }
 }
