@@ -5,10 +5,13 @@ use pita_sim::{DQuat, DVec3, Settings};
 
 use super::TICK_HZ;
 use super::scene::Content;
-use super::trace::{BodyState, Engine};
+use super::trace::{BodyState, Engine, Trouble};
 
 /// Our engine with a scene in it, one step a tick.
-pub struct Ours(SceneFile);
+pub struct Ours {
+    scene: SceneFile,
+    trouble: Trouble,
+}
 
 /// Why a scene cannot run.
 #[derive(Debug, thiserror::Error)]
@@ -30,7 +33,8 @@ impl Ours {
         match content {
             Content::Rigid(_, scene) => {
                 let settings = Settings { threads, ..Settings::at(TICK_HZ.recip()) };
-                Ok(Self(SceneFile::parse(&scene.to_string(), &settings)?))
+                let scene = SceneFile::parse(&scene.to_string(), &settings)?;
+                Ok(Self { scene, trouble: Trouble::default() })
             }
             Content::Beam(_) => Err(OursError::NoFiniteElements),
         }
@@ -39,17 +43,23 @@ impl Ours {
 
 impl Engine for Ours {
     fn tick(&mut self) {
-        self.0.world.step();
+        let report = self.scene.world.step();
+        self.trouble.unconverged_ticks += usize::from(report.unconverged_islands > 0);
+        self.trouble.quarantined += report.quarantined;
     }
 
     fn record(&self, into: &mut Vec<BodyState>) {
-        let world = &self.0.world;
+        let world = &self.scene.world;
         // No body of a scene is ever removed, so each of them has a state.
-        into.extend(self.0.bodies.iter().map(|&id| BodyState {
+        into.extend(self.scene.bodies.iter().map(|&id| BodyState {
             position: world.position(id).unwrap_or(DVec3::NAN),
             rotation: world.rotation(id).unwrap_or(DQuat::NAN),
             velocity: world.velocity(id).unwrap_or(DVec3::NAN),
             angular_velocity: world.angular_velocity(id).unwrap_or(DVec3::NAN),
         }));
+    }
+
+    fn trouble(&self) -> Option<Trouble> {
+        Some(self.trouble)
     }
 }

@@ -9,6 +9,19 @@ pub trait Engine {
     fn tick(&mut self);
     /// Appends the state of every body, in the scene's order; of every node where the scene is an elastic body.
     fn record(&self, into: &mut Vec<BodyState>);
+    /// What it says went wrong so far; `None` where an engine does not tell.
+    fn trouble(&self) -> Option<Trouble> {
+        None
+    }
+}
+
+/// What went wrong in a run, by the engine's own word.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Trouble {
+    /// Ticks at whose end some island's equations were not solved to the tolerance.
+    pub unconverged_ticks: usize,
+    /// Bodies that were taken out of the scene because their state was no number.
+    pub quarantined: usize,
 }
 
 /// State of a body, or of a node, which neither turns nor spins.
@@ -64,12 +77,14 @@ impl Trace {
     }
 }
 
-/// States and times of a run.
+/// States, times and troubles of a run.
 pub struct Run {
     /// What happened.
     pub trace: Trace,
     /// What every tick took.
     pub times: Vec<TickTime>,
+    /// What the engine says went wrong; `None` where it does not tell.
+    pub trouble: Option<Trouble>,
 }
 
 /// Runs `ticks` ticks, of which only the engine's own time counts, and calls `after_tick` after each.
@@ -84,7 +99,7 @@ pub fn run(engine: &mut impl Engine, ticks: usize, mut after_tick: impl FnMut())
         engine.record(&mut states);
         after_tick();
     }
-    Run { trace: Trace::new(bodies, states), times }
+    Run { trace: Trace::new(bodies, states), times, trouble: engine.trouble() }
 }
 
 /// The quantile `q`, 0 to 1, of `values`, linear between two of them (Hyndman and Fan's type 7, NumPy's default).

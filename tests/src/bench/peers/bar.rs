@@ -36,3 +36,34 @@ impl Bar {
                 || verdict.value("speed_m_per_s").is_some_and(|speed| speed < REST_SPEED))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::yardstick::catalogue;
+    use crate::yardstick::judge::{Figure, Unit};
+
+    fn met(scene: &str, accepted: bool, speed: f64, p50_ratio: f64, p99_ratio: f64) -> bool {
+        let content = catalogue::content(scene).unwrap();
+        let speed = Figure { label: "v", key: "speed_m_per_s", value: speed, unit: Unit::MetresPerSecond };
+        let verdict = Verdict { accepted, figures: vec![speed], ..Verdict::default() };
+        Bar::of(&content).is_met(&content, &verdict, Some(p50_ratio), Some(p99_ratio))
+    }
+
+    #[test]
+    fn acceptance_cost_and_worst_ticks_all_count() {
+        assert!(met("chain", true, 1.0, 0.079, 1.0));
+        assert!(!met("chain", false, 1.0, 0.079, 1.0));
+        assert!(!met("chain", true, 1.0, 0.081, 1.0));
+        assert!(!met("chain", true, 1.0, 0.079, 1.01));
+        assert!(met("cars64", true, 15.0, 0.49, 1.0) && !met("cars64", true, 15.0, 0.51, 1.0));
+        assert!(met("pile500", true, 0.0, 0.59, 1.5) && !met("pile500", true, 0.0, 0.59, 1.6));
+        assert!(met("slope45", true, 0.0, 0.99, 1.5) && !met("slope45", true, 0.0, 1.01, 1.5));
+    }
+
+    #[test]
+    fn sheep_have_to_rest() {
+        assert!(met("sheep100", true, 0.009, 0.49, 1.0));
+        assert!(!met("sheep100", true, 0.011, 0.49, 1.0));
+    }
+}

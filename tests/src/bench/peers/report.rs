@@ -8,6 +8,7 @@ use crate::bench::Report;
 use crate::table::table;
 use crate::yardstick::judge::three_digits;
 use crate::yardstick::rapier::Setting;
+use crate::yardstick::trace::Trouble;
 
 const HEADER: [&str; 8] = ["scene", "engine", "setting", "p50, ms", "p99, ms", "pita / it", "accepted", "quality"];
 
@@ -26,7 +27,7 @@ const BAR_HEADER: [&str; 9] = [
 const NOTE: &str = "ms are CPU time of all threads, p50 and p99 over the ticks of a run, the least of all rounds. Rapier \
 ran here and now; what other peers cost is the figure of the yardstick's PEERS.md times rapier's now / then on that \
 scene. Their p99 at those settings is not published: p99 is held against rapier's, at its accepted setting where it has \
-one. Sheep have to come to rest as well. PEERS.md calls differences under 20 % ties.";
+one (the yardstick's compare.py holds it against MuJoCo's). Sheep have to come to rest as well. PEERS.md calls differences under 20 % ties.";
 
 /// The report of all scenes.
 pub fn report(scenes: &[Measured]) -> Report {
@@ -59,10 +60,16 @@ fn rows(scene: &Measured) -> Vec<Vec<String>> {
 }
 
 fn row(head: [&str; 3], outcome: &Outcome, ratio: String) -> Vec<String> {
-    let Outcome { p50_ms, p99_ms, verdict } = outcome;
+    let Outcome { p50_ms, p99_ms, trouble, verdict } = outcome;
     let accepted = yes_or_no(verdict.accepted);
-    [&head.map(str::to_owned)[..], &[three_digits(*p50_ms), three_digits(*p99_ms), ratio, accepted, verdict.text()]]
-        .concat()
+    let mut quality = verdict.text();
+    if let Some(Trouble { unconverged_ticks, quarantined }) = trouble {
+        let counts = [(unconverged_ticks, "ticks unconverged"), (quarantined, "bodies quarantined")];
+        for (count, what) in counts.into_iter().filter(|(count, _)| **count > 0) {
+            quality += &format!(", {count} {what}");
+        }
+    }
+    [&head.map(str::to_owned)[..], &[three_digits(*p50_ms), three_digits(*p99_ms), ratio, accepted, quality]].concat()
 }
 
 /// How ours stands against the peers on a scene.
@@ -158,12 +165,16 @@ fn cheapest(scene: &Measured, scale: f64) -> Option<Peer> {
 }
 
 fn run_json(outcome: &Outcome, setting: Option<&Setting>) -> Value {
-    let Outcome { p50_ms, p99_ms, verdict } = outcome;
+    let Outcome { p50_ms, p99_ms, trouble, verdict } = outcome;
     let mut figures: Map<String, Value> =
         verdict.figures.iter().map(|figure| (figure.key.to_owned(), json!(figure.value))).collect();
     figures.insert("p50_ms".to_owned(), json!(p50_ms));
     figures.insert("p99_ms".to_owned(), json!(p99_ms));
     figures.insert("accepted".to_owned(), json!(verdict.accepted));
+    if let Some(trouble) = trouble {
+        figures.insert("unconverged_ticks".to_owned(), json!(trouble.unconverged_ticks));
+        figures.insert("quarantined_bodies".to_owned(), json!(trouble.quarantined));
+    }
     if let Some(failure) = verdict.failure {
         figures.insert("failure".to_owned(), json!(failure));
     }
@@ -176,4 +187,63 @@ fn run_json(outcome: &Outcome, setting: Option<&Setting>) -> Value {
 
 fn yes_or_no(yes: bool) -> String {
     if yes { "yes" } else { "no" }.to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use pita_game::scene::SceneError;
+
+    use super::*;
+    use crate::bench::peers::published::PUBLISHED;
+    use crate::yardstick::catalogue;
+    use crate::yardstick::judge::Verdict;
+    use crate::yardstick::ours::OursError;
+
+    fn outcome(p50_ms: f64, accepted: bool) -> Outcome {
+        let verdict = Verdict { accepted, ..Verdict::default() };
+        Outcome { p50_ms, p99_ms: 2.0 * p50_ms, trouble: None, verdict }
+    }
+
+    /// The chain, with rapier twice as slow as published.
+    fn chain(ours: Result<Outcome, OursError>, rapier_is_accepted: bool) -> Measured {
+        let published = PUBLISHED.iter().find(|entry| entry.scene == "chain").unwrap();
+        let (setting, then_ms) = published.rapier_accepted.unwrap();
+        let tuned = outcome(2.0 * then_ms, rapier_is_accepted);
+        let rapier = vec![(Setting::DEFAULT, outcome(0.01, false)), (setting, tuned)];
+        Measured { published, content: catalogue::content("chain").unwrap(), ours, rapier }
+    }
+
+    #[test]
+    fn other_peers_are_scaled_by_rapier_then_and_now() {
+        let scene = chain(Ok(outcome(0.1, true)), true);
+        let standing = Standing::of(&scene);
+        let cheapest = standing.cheapest.as_ref().unwrap();
+        assert_eq!((cheapest.name.as_str(), cheapest.is_scaled), ("MuJoCo k=32, scaled", true));
+        assert!((cheapest.p50_ms - 2.0 * 0.741).abs() < 1e-12);
+        assert!((standing.p50_ratio.unwrap() - 0.1 / 1.482).abs() < 1e-12);
+        assert!((standing.p99_ratio.unwrap() - 0.1 / 2.72).abs() < 1e-12);
+        assert!(standing.is_met);
+    }
+
+    #[test]
+    fn only_accepted_peers_count() {
+        let mut scene = chain(Ok(outcome(0.1, true)), true);
+        scene.rapier[0].1.verdict.accepted = true;
+        let cheapest = Standing::of(&scene).cheapest.unwrap();
+        assert_eq!((cheapest.name.as_str(), cheapest.p50_ms, cheapest.is_scaled), ("rapier k=1", 0.01, false));
+    }
+
+    #[test]
+    fn what_does_not_run_has_no_ratio_and_meets_no_bar() {
+        let refusal = SceneError { line: 3, what: "no such shape".to_owned() };
+        let scene = chain(Err(refusal.into()), true);
+        let report = report(&[scene]);
+        let figures = &report.figures["chain"];
+        assert_eq!(figures["p50_ratio"], Value::Null);
+        assert_eq!(figures["bar_met"], false);
+        assert_eq!(figures["pita"]["error"], "line 3: no such shape");
+        assert_eq!(figures["rapier"][1]["solver_iterations_per_step"], 256);
+        assert_eq!(report.rows.len(), 3);
+        assert!(report.rows.iter().all(|row| row.len() == HEADER.len()), "{:?}", report.rows);
+    }
 }
