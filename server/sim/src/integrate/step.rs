@@ -75,11 +75,35 @@ impl Integrator {
 
     /// Integrates one tick.
     pub fn step(&mut self, scene: &mut Scene) -> StepReport {
+        self.gather(scene);
+        self.solve(scene.settings);
+        self.scatter(scene)
+    }
+
+    /// Solves one tick, and leaves everything as it was. Answers what the solver did.
+    pub fn rehearse(&mut self, scene: &mut Scene) -> StepReport {
+        let forces: Vec<_> = scene.bodies.iter().map(|(id, body)| (id, body.force, body.torque)).collect();
+        self.gather(scene);
+        for (id, force, torque) in forces {
+            (scene.bodies[id].force, scene.bodies[id].torque) = (force, torque);
+        }
+        self.solve(scene.settings);
+        let mut report = StepReport { bodies: self.active.len(), ..StepReport::default() };
+        self.sum_up(&mut report);
+        report
+    }
+
+    fn gather(&mut self, scene: &mut Scene) {
         self.gather_bodies(scene);
         self.build_islands(scene);
         self.gather_potentials(scene);
-        self.solve(scene.settings);
-        self.scatter(scene)
+    }
+
+    fn sum_up(&self, report: &mut StepReport) {
+        report.islands = self.islands.len();
+        for solve in &self.solves[..self.islands.len()] {
+            solve.sum_up(report);
+        }
     }
 
     fn solve(&mut self, settings: &Settings) {
@@ -102,7 +126,8 @@ impl Integrator {
     }
 
     fn scatter(&mut self, scene: &mut Scene) -> StepReport {
-        let mut report = StepReport { islands: self.islands.len(), ..StepReport::default() };
+        let mut report = StepReport::default();
+        self.sum_up(&mut report);
         for active in &self.active {
             let place = self.islands.place(active.first);
             let problem = self.solves.get(place.island as usize).map(|solve| &solve.problem);
@@ -152,7 +177,7 @@ impl Solve {
         self.ball_joints.clear();
     }
 
-    /// Hands back what potentials remember, and sums up.
+    /// Hands back what potentials remember, and looks how well they hold.
     fn write_back(&self, scene: &mut Scene, report: &mut StepReport) {
         let (problem, dt) = (&self.problem, self.problem.dt);
         for (term, &source) in problem.terms.contacts.iter().zip(&self.contacts) {
@@ -177,6 +202,9 @@ impl Solve {
         for term in &problem.terms.axles {
             report.worst_joint_gap = report.worst_joint_gap.max(term.gap(problem.pair(term)));
         }
+    }
+
+    fn sum_up(&self, report: &mut StepReport) {
         report.contacts += self.contacts.len();
         let SolveReport { iterations, linear_iterations, evaluations, work, residual, stopped_because, .. } =
             self.report;

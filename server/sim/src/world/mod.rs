@@ -14,7 +14,7 @@ use crate::dof::{
 use crate::error::{SimError, require, require_rotation, require_vector};
 use crate::integrate::{Integrator, Scene, StepReport};
 use crate::potential::{Anchor, Potentials};
-use crate::settings::Settings;
+use crate::settings::{Settings, SolverSettings};
 use crate::state::State;
 
 /// A running world.
@@ -455,7 +455,27 @@ impl World {
 
     /// Stage 4: integrates all DOF over one tick.
     pub fn integrate(&mut self) -> &StepReport {
-        let mut scene = Scene {
+        let (integrator, mut scene) = self.scene();
+        let report = integrator.step(&mut scene);
+        self.report = report;
+        self.detector.remember();
+        &self.report
+    }
+
+    /// What stage 4 would take with another solver, from the same state; nothing moves. It is for comparing solvers:
+    /// the report has what the solver did, and nothing of what became of contacts and joints.
+    ///
+    /// # Errors
+    /// [`SimError::OutOfRange`] for a bad setting.
+    pub fn rehearse(&mut self, solver: &SolverSettings) -> Result<StepReport, SimError> {
+        let settings = Settings { solver: solver.clone(), ..self.settings.clone() };
+        settings.validate()?;
+        let (integrator, scene) = self.scene();
+        Ok(integrator.rehearse(&mut Scene { settings: &settings, ..scene }))
+    }
+
+    fn scene(&mut self) -> (&mut Integrator, Scene<'_>) {
+        let scene = Scene {
             settings: &self.settings,
             state: &mut self.state,
             bodies: &mut self.bodies,
@@ -464,9 +484,7 @@ impl World {
             potentials: &mut self.potentials,
             contacts: &mut self.detector.contacts,
         };
-        self.report = self.integrator.step(&mut scene);
-        self.detector.remember();
-        &self.report
+        (&mut self.integrator, scene)
     }
 
     /// Stages 2 and 4, for worlds without game logic.

@@ -103,6 +103,33 @@ fn budgets_are_shared_by_islands_and_reported() {
     }
 }
 
+/// A rehearsal tells what a tick would take, and the world does not notice.
+#[test]
+fn rehearsals_leave_no_trace() {
+    let mut rehearsing = heap(SolverSettings::default(), 1);
+    let mut alone = heap(SolverSettings::default(), 1);
+    for tick in 0..20 {
+        for world in [&mut rehearsing, &mut alone] {
+            let first = world.bodies()[0];
+            world.apply_force(first, DVec3::X * 2e3, world.position(first).unwrap()).unwrap();
+            world.detect_collisions();
+        }
+        let mut reports = Vec::new();
+        for (_, method) in Method::ALL.into_iter().filter(|(_, method)| *method != Method::Jacobi) {
+            let solver = SolverSettings { method, ..SolverSettings::default() };
+            reports.push((method, rehearsing.rehearse(&solver).unwrap()));
+        }
+        let integrated = rehearsing.integrate().clone();
+        assert_eq!(&integrated, alone.integrate(), "tick {tick}");
+        assert_eq!(rehearsing.state_hash(), alone.state_hash(), "tick {tick}");
+        let (_, rehearsed) = reports.iter().find(|(method, _)| *method == Method::default()).unwrap();
+        assert_eq!((rehearsed.work, rehearsed.residual), (integrated.work, integrated.residual), "tick {tick}");
+        assert_eq!(rehearsed.contacts, integrated.contacts, "tick {tick}");
+    }
+    let nonsense = SolverSettings { sweeps: 0, ..SolverSettings::default() };
+    assert!(rehearsing.rehearse(&nonsense).is_err());
+}
+
 #[test]
 fn settings_that_make_no_sense_are_refused_by_name() {
     let refused = |solver: SolverSettings, what: &str| {
