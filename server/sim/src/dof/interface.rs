@@ -141,6 +141,18 @@ pub trait Dof: Send + Sync {
     /// Hands `visit` every block that moves the frame at a material point, with the frame's derivatives.
     fn jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns));
 
+    /// Both at once, for kinds to which that is less work.
+    fn frame_and_jacobian(
+        &self,
+        at: PartPoint,
+        q: &[f64],
+        v: &[f64],
+        visit: &mut dyn FnMut(usize, &Columns),
+    ) -> Frame<f64> {
+        self.jacobian(at, q, visit);
+        self.frame(at, q, v)
+    }
+
     // --- Inertia
 
     /// Its inertia.

@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::block::{Block, Entry};
+use super::attachment::{Attachment, Influence};
+use super::block::{Block, Entry, zero};
+use super::pull_back::{add_block, inertia_block, multiplied, projected};
 use crate::dof::{
     Columns, Dof, FigureBody, Frame, Inertia, LocalState, PartInertia, PartLoad, PartPoint, PointMasses, Twist,
 };
@@ -47,29 +49,6 @@ pub(crate) trait Blocks {
     fn add_point(&mut self, row: u32, column: u32, block: &DMat3, mass: f64);
 }
 
-/// A material point of a figure at which something acts: one more frame of the island.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Attachment {
-    figure: u32,
-    at: PartPoint,
-    /// Its derivatives stay what they were at the start of the tick.
-    frozen: bool,
-    influences: (u32, u32),
-    pub start: Frame<f64>,
-    /// What resists a force here, kg.
-    pub mass: f64,
-}
-
-/// How a block moves an attachment's frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Influence {
-    /// Index in the island.
-    pub block: u32,
-    /// Block's index in its figure.
-    own_block: u32,
-    pub columns: Columns,
-}
-
 /// All figures of an island and their attachments.
 #[derive(Default)]
 pub(crate) struct Figures {
@@ -80,9 +59,15 @@ pub(crate) struct Figures {
     influences: Vec<Influence>,
     /// Gradient on each attachment.
     wrenches: Vec<Wrench>,
+    /// Hessian on each attachment.
+    hessians: Vec<Block<6>>,
     /// Whether the figures' second derivatives have to be positive semidefinite.
     definite: bool,
 }
+
+/// How many of the last attachments are looked at for one that a new one can share: those of the other contact points of
+/// the same pair of colliders.
+const SHARED: usize = 4;
 
 impl Figures {
     pub fn clear(&mut self) {
@@ -136,12 +121,16 @@ impl Figures {
 
     /// Makes a frame of a material point. Answers its index among the attachments.
     pub fn attach(&mut self, figure: u32, at: PartPoint, frozen: bool) -> u32 {
+        let same = |a: &Attachment| (a.figure, a.at, a.frozen) == (figure, at, frozen);
+        if let Some(back) = self.attachments.iter().rev().take(SHARED).position(same) {
+            return (self.attachments.len() - 1 - back) as u32;
+        }
         let Self { list, influences, .. } = self;
         let owner = &list[figure as usize];
         let first = influences.len() as u32;
         owner.dof.jacobian(at, &owner.q0, &mut |own_block, columns| {
-            let block = owner.blocks[own_block];
-            influences.push(Influence { block, own_block: own_block as u32, columns: *columns });
+            let (block, size) = (owner.blocks[own_block], owner.dof.blocks()[own_block].rates);
+            influences.push(Influence { block, own_block: own_block as u32, size, columns: *columns });
         });
         let range = (first, influences.len() as u32);
         let start = owner.dof.frame(at, &owner.q0, &owner.v0);
@@ -210,38 +199,41 @@ impl Figures {
         energy
     }
 
-    /// Hands over the blocks of the figures' inertia and of their own potentials.
+    /// Forgets the Hessian on attachments.
+    pub fn begin_hessian(&mut self) {
+        self.hessians.clear();
+        self.hessians.resize(self.attachments.len(), zero());
+    }
+
+    /// Adds to the Hessian on attachment `k`.
+    pub fn stiffen(&mut self, k: usize, block: &Block<6>, factor: f64) {
+        add_block(&mut self.hessians[k], block, factor);
+    }
+
+    /// Hands over the blocks of the figures' inertia, of their own potentials, and of what acts on single attachments.
     pub fn assemble(&mut self, dt: f64, frames: &[Frame<f64>], blocks: &mut impl Blocks) {
         let attached = &frames[frames.len() - self.attachments.len()..];
         for (index, figure) in (0..).zip(&mut self.list[..self.used]) {
             figure.load(index, &self.attachments, &self.wrenches, attached);
             figure.stiffen_points(dt, self.definite);
-        }
-        for figure in self.list() {
             match figure.dof.inertia() {
                 Inertia::Points(masses) => figure.assemble_points(masses, dt * dt, blocks),
                 Inertia::Parts(parts) => {
-                    let all = (figure.parts.start as usize..).zip(parts).zip(&figure.geometric);
-                    for ((k, part), &geometric) in all {
+                    for ((k, part), &geometric) in (figure.parts.start as usize..).zip(parts).zip(&figure.geometric) {
                         let turning = world_inertia(&attached[k], part.inertia) + geometric * dt;
-                        self.assemble_part(k, part.mass, turning, blocks);
+                        add_block(&mut self.hessians[k], &inertia_block(part.mass, turning), 1.0);
                     }
                     figure.assemble_stiffness(dt, self.definite, blocks);
                 }
             }
         }
-    }
-
-    fn assemble_part(&self, k: usize, mass: f64, inertia: DMat3, blocks: &mut impl Blocks) {
-        let mut tensor = [[0.0; 6]; 6];
-        for i in 0..3 {
-            tensor[i][i] = mass;
-            tensor[3 + i][3..].copy_from_slice(&inertia.col(i).to_array());
-        }
-        let influences = self.influences(k);
-        for a in influences {
-            for b in influences.iter().filter(|b| b.block <= a.block) {
-                blocks.add(a.block, b.block, &pulled_back(&a.columns, &tensor, &b.columns));
+        for (k, hessian) in self.hessians.iter().enumerate() {
+            let influences = self.influences(k);
+            for b in influences {
+                let half = multiplied(hessian, &b.columns);
+                for a in influences.iter().filter(|a| a.block >= b.block) {
+                    blocks.add(a.block, b.block, &projected(&a.columns, a.size, &half));
+                }
             }
         }
     }
@@ -254,11 +246,11 @@ impl Figures {
             if let Inertia::Points(masses) = figure.dof.inertia() {
                 masses.off_diagonal.iter().for_each(|&(a, b, _)| pair(blocks[a as usize], blocks[b as usize]));
             }
-            for k in figure.parts.clone() {
-                let influences = self.influences(k as usize);
-                for (i, a) in influences.iter().enumerate() {
-                    influences[..i].iter().for_each(|b| pair(a.block, b.block));
-                }
+        }
+        for k in 0..self.attachments.len() {
+            let influences = self.influences(k);
+            for (i, a) in influences.iter().enumerate() {
+                influences[..i].iter().for_each(|b| pair(a.block, b.block));
             }
         }
     }
@@ -457,42 +449,6 @@ impl Figure {
             blocks.add(self.blocks[row], self.blocks[column], &scaled);
         });
     }
-}
-
-impl Attachment {
-    /// The frame at the figure's candidate state; refreshes the derivatives, unless they are frozen.
-    fn frame(&self, figure: &Figure, influences: &mut [Influence]) -> Frame<f64> {
-        if !self.frozen {
-            let mut next = influences.iter_mut();
-            figure.dof.jacobian(self.at, &figure.q1, &mut |_, columns| {
-                if let Some(influence) = next.next() {
-                    influence.columns = *columns;
-                }
-            });
-            return figure.dof.frame(self.at, &figure.q1, &figure.v1);
-        }
-        let mut twist = Twist::REST;
-        for influence in influences {
-            let rates = &figure.v1[figure.offsets[influence.own_block as usize] as usize..];
-            let size = usize::from(figure.dof.blocks()[influence.own_block as usize].rates);
-            for (column, &rate) in influence.columns.iter().zip(&rates[..size]) {
-                twist.linear += DVec3::from_slice(column) * rate;
-                twist.angular += DVec3::from_slice(&column[3..]) * rate;
-            }
-        }
-        Frame { linear: twist.linear.into(), angular: twist.angular.into(), ..self.start }
-    }
-}
-
-/// Aᵀ H B, A and B derivatives of frames.
-pub(super) fn pulled_back(a: &Columns, h: &Block<6>, b: &Columns) -> Block<6> {
-    let mut half = [[0.0; 6]; 6];
-    for (half, column) in half.iter_mut().zip(b) {
-        for (x, row) in half.iter_mut().zip(h) {
-            *x = row.iter().zip(column).map(|(h, c)| h * c).sum();
-        }
-    }
-    std::array::from_fn(|i| std::array::from_fn(|j| (0..6).map(|k| a[i][k] * half[j][k]).sum()))
 }
 
 /// Twice the energy of an angular momentum, J; none for what does not turn.

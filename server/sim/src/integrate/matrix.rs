@@ -4,8 +4,9 @@
 //! factorisations. Stored are the diagonal and the lower triangle, row by row, columns ascending.
 
 use super::block::{Block, Entry, multiply_add, transposed_multiply_add, zero};
-use super::figure::{Blocks, Figures, pulled_back};
+use super::figure::{Blocks, Figures};
 use super::problem::{Problem, Unknown, Visitor, pair};
+use super::pull_back::{multiplied, projected};
 use super::solver::work::block;
 use glam::DMat3;
 
@@ -69,6 +70,7 @@ impl<const D: usize> Matrix<D> {
         }
         self.lower.fill(zero());
         let Problem { dt, terms, figures, frames, .. } = problem;
+        figures.begin_hessian();
         let mut slots = std::mem::take(&mut self.slots);
         terms.visit(&mut Assemble { dt: *dt, frames, figures, matrix: self, slots: slots.iter() });
         std::mem::swap(&mut self.slots, &mut slots);
@@ -151,12 +153,12 @@ const IDENTITY: Columns = {
     columns
 };
 
-/// Hands `each` every block that moves a frame, with the frame's derivatives.
-fn movers(figures: &Figures, blocks: usize, frame: FrameIndex, mut each: impl FnMut(u32, &Columns)) {
+/// Hands `each` every block that moves a frame, with the number of its rates and the frame's derivatives.
+fn movers(figures: &Figures, blocks: usize, frame: FrameIndex, mut each: impl FnMut(u32, u8, &Columns)) {
     if (frame as usize) < blocks {
-        each(frame, &IDENTITY);
+        each(frame, 6, &IDENTITY);
     } else if frame != FIXED {
-        figures.influences(frame as usize - blocks).iter().for_each(|i| each(i.block, &i.columns));
+        figures.influences(frame as usize - blocks).iter().for_each(|i| each(i.block, i.size, &i.columns));
     }
 }
 
@@ -174,15 +176,13 @@ impl Visitor for Pairs<'_> {
                 self.pairs.push(pair);
                 continue;
             }
-            for (a, b) in [(0, 0), (0, 1), (1, 1)].map(|(i, j)| (frames[i], frames[j])) {
-                movers(self.figures, self.blocks, a, |i, _| {
-                    movers(self.figures, self.blocks, b, |j, _| {
-                        if i != j {
-                            self.pairs.push((i.max(j), i.min(j)));
-                        }
-                    });
+            movers(self.figures, self.blocks, frames[0], |i, _, _| {
+                movers(self.figures, self.blocks, frames[1], |j, _, _| {
+                    if i != j {
+                        self.pairs.push((i.max(j), i.min(j)));
+                    }
                 });
-            }
+            });
         }
     }
 }
@@ -239,7 +239,7 @@ fn add_block_of_points<const D: usize>(target: &mut Block<D>, source: &Block<3>,
 struct Assemble<'a, const D: usize> {
     dt: f64,
     frames: &'a [Frame<f64>],
-    figures: &'a Figures,
+    figures: &'a mut Figures,
     matrix: &'a mut Matrix<D>,
     slots: std::slice::Iter<'a, u32>,
 }
@@ -253,7 +253,7 @@ impl<const D: usize> Visitor for Assemble<'_, D> {
             let hessian = term.hessian(self.dt, pair(self.frames, term));
             let [a, b] = term.frames();
             if [a, b].iter().any(|&frame| frame != FIXED && frame as usize >= blocks) {
-                self.add_pulled_back([a, b], &hessian, factor);
+                self.add_attached([a, b], &hessian, factor);
                 continue;
             }
             let PairBlocks { aa, ab, bb } = hessian;
@@ -271,17 +271,25 @@ impl<const D: usize> Visitor for Assemble<'_, D> {
 }
 
 impl<const D: usize> Assemble<'_, D> {
-    /// Adds a term that acts on material points of figures: Jᵀ H J over all blocks that move them.
-    fn add_pulled_back(&mut self, [a, b]: [FrameIndex; 2], hessian: &PairBlocks, factor: f64) {
+    /// Adds a term that acts on material points of figures. What it does to one end alone is summed up there and pulled
+    /// back once for all terms; what it does between its ends is Jᵀ H J over all blocks that move them.
+    fn add_attached(&mut self, [a, b]: [FrameIndex; 2], hessian: &PairBlocks, factor: f64) {
         let Self { figures, matrix, .. } = self;
         let blocks = matrix.diagonal.len();
-        let PairBlocks { aa, ab, bb } = hessian;
-        let ba = &std::array::from_fn(|i| std::array::from_fn(|j| ab[j][i]));
-        for (row, column, block) in [(a, a, aa), (a, b, ab), (b, a, ba), (b, b, bb)] {
-            movers(figures, blocks, row, |i, left| {
-                movers(figures, blocks, column, |j, right| {
+        for (end, block) in [(a, &hessian.aa), (b, &hessian.bb)] {
+            if (end as usize) < blocks {
+                add_scaled(&mut matrix.diagonal[end as usize], block, factor, false);
+            } else if end != FIXED {
+                figures.stiffen(end as usize - blocks, block, factor);
+            }
+        }
+        let ba = std::array::from_fn(|i| std::array::from_fn(|j| hessian.ab[j][i]));
+        for (row, column, block) in [(a, b, &hessian.ab), (b, a, &ba)] {
+            movers(figures, blocks, column, |j, _, right| {
+                let half = multiplied(block, right);
+                movers(figures, blocks, row, |i, size, left| {
                     if i >= j {
-                        matrix.add(i, j, &pulled_back(left, block, right), factor);
+                        matrix.add(i, j, &projected(left, size, &half), factor);
                     }
                 });
             });

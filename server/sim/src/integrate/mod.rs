@@ -4,6 +4,7 @@
 //! `line_search`, the sparse `matrix`, its `factorization` and the preconditioned `conjugate_gradient` under it.
 //! Islands share nothing while they are solved, so that threads cannot change the result.
 
+mod attachment;
 pub(crate) mod block;
 mod conjugate_gradient;
 mod factorization;
@@ -13,6 +14,7 @@ mod line_search;
 mod matrix;
 mod preconditioner;
 pub(crate) mod problem;
+mod pull_back;
 mod solver;
 mod step;
 mod vector;

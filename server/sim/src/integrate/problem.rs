@@ -244,6 +244,7 @@ impl Problem {
         let Self { dt, unknowns, terms, figures, frames, .. } = self;
         y.clear();
         y.extend(unknowns.iter().zip(x).map(|(unknown, x)| unknown.inertia_product(x)));
+        figures.begin_hessian();
         figures.assemble(*dt, frames, &mut TimesVector { x, y });
         let along = Propose { step: x, figures, dt: *dt };
         let moving: Vec<_> =

@@ -28,6 +28,7 @@ mod well;
 
 use std::ops::Range;
 
+use arrayvec::ArrayVec;
 use glam::{DMat3, DVec3};
 
 pub use desc::{JointDesc, PARTS_MAX, PartDesc};
@@ -147,6 +148,23 @@ impl Articulated {
         self.joints[self.movers[block] as usize].rates()
     }
 
+    /// Hands `each` every joint that moves a material point, with its block and the derivatives. Answers where the part
+    /// is.
+    fn walk(&self, at: PartPoint, q: &[f64], mut each: impl FnMut(usize, &Joint, &Columns)) -> Place {
+        let (mut parents, mut place) = (ArrayVec::<Place, PARTS_MAX>::new(), Place::WORLD);
+        for joint in self.path(at.part) {
+            parents.push(place);
+            place = joint.place(&place, q);
+        }
+        let x = place.point(at.point);
+        for (joint, parent) in self.path(at.part).zip(&parents) {
+            if let Some(block) = joint.block {
+                each(block, joint, &joint.columns(parent, q, x));
+            }
+        }
+        place
+    }
+
     /// Where a part is.
     fn place(&self, part: u32, q: &[f64]) -> Place {
         self.path(part).fold(Place::WORLD, |place, joint| joint.place(&place, q))
@@ -200,14 +218,25 @@ impl Dof for Articulated {
     }
 
     fn jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns)) {
-        let x: DVec3 = self.place(at.part, q).point(at.point);
-        let mut place = Place::WORLD;
-        for joint in self.path(at.part) {
-            if let Some(block) = joint.block {
-                visit(block, &joint.columns(&place, q, x));
+        self.walk(at, q, |block, _, columns| visit(block, columns));
+    }
+
+    fn frame_and_jacobian(
+        &self,
+        at: PartPoint,
+        q: &[f64],
+        v: &[f64],
+        visit: &mut dyn FnMut(usize, &Columns),
+    ) -> Frame<f64> {
+        let mut twist = Twist::REST;
+        let place = self.walk(at, q, |block, joint, columns| {
+            for (column, &rate) in columns.iter().zip(joint.v(v)) {
+                twist.linear += DVec3::from_slice(column) * rate;
+                twist.angular += DVec3::from_slice(&column[3..]) * rate;
             }
-            place = joint.place(&place, q);
-        }
+            visit(block, columns);
+        });
+        Frame::new(place.point(at.point), place.rotation, twist.linear, twist.angular)
     }
 
     fn inertia(&self) -> Inertia<'_> {

@@ -1,0 +1,54 @@
+//! Material points of figures at which something acts: frames of an island beside those of its blocks.
+
+use glam::DVec3;
+
+use super::figure::Figure;
+use crate::dof::{Columns, Frame, PartPoint, Twist};
+
+/// A material point of a figure at which something acts: one more frame of the island.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Attachment {
+    pub figure: u32,
+    pub at: PartPoint,
+    /// Its derivatives stay what they were at the start of the tick.
+    pub frozen: bool,
+    pub influences: (u32, u32),
+    pub start: Frame<f64>,
+    /// What resists a force here, kg.
+    pub mass: f64,
+}
+
+/// How a block moves an attachment's frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Influence {
+    /// Index in the island.
+    pub block: u32,
+    /// Block's index in its figure.
+    pub own_block: u32,
+    /// Rates that the block has.
+    pub size: u8,
+    pub columns: Columns,
+}
+
+impl Attachment {
+    /// The frame at the figure's candidate state; refreshes the derivatives, unless they are frozen.
+    pub fn frame(&self, figure: &Figure, influences: &mut [Influence]) -> Frame<f64> {
+        if !self.frozen {
+            let mut next = influences.iter_mut();
+            return figure.dof.frame_and_jacobian(self.at, &figure.q1, &figure.v1, &mut |_, columns| {
+                if let Some(influence) = next.next() {
+                    influence.columns = *columns;
+                }
+            });
+        }
+        let mut twist = Twist::REST;
+        for influence in influences {
+            let rates = &figure.v1[figure.offsets[influence.own_block as usize] as usize..];
+            for (column, &rate) in influence.columns.iter().zip(&rates[..usize::from(influence.size)]) {
+                twist.linear += DVec3::from_slice(column) * rate;
+                twist.angular += DVec3::from_slice(&column[3..]) * rate;
+            }
+        }
+        Frame { linear: twist.linear.into(), angular: twist.angular.into(), ..self.start }
+    }
+}
