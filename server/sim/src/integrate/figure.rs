@@ -9,9 +9,7 @@ use glam::{DMat3, DVec3};
 use super::attachment::{Attachment, Influence};
 use super::block::{Block, Entry, zero};
 use super::pull_back::{add_block, inertia_block, multiplied, projected};
-use crate::dof::{
-    Columns, Dof, FigureBody, Frame, Inertia, LocalState, PartInertia, PartLoad, PartPoint, PointMasses, Twist,
-};
+use crate::dof::{Dof, FigureBody, Frame, Inertia, LocalState, PartInertia, PartLoad, PartPoint, PointMasses, Twist};
 use crate::potential::Wrench;
 
 /// A body of a general kind in an island.
