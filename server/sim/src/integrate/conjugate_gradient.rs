@@ -13,6 +13,32 @@ const VECTORS_TO_START: u64 = 4;
 /// Passes over vectors in an iteration: two products, three sums, a copy.
 const VECTORS_AN_ITERATION: u64 = 6;
 
+/// What conjugate gradients solve with: a product with vectors, and the matrix that preconditioners are made of.
+pub(super) trait Operator<const D: usize> {
+    /// y = A x.
+    fn product(&mut self, x: &[Entry<D>], y: &mut Vec<Entry<D>>);
+
+    /// Multiply-adds of a product.
+    fn product_work(&self) -> u64;
+
+    /// A, or something like it, assembled.
+    fn matrix(&self) -> &Matrix<D>;
+}
+
+impl<const D: usize> Operator<D> for &Matrix<D> {
+    fn product(&mut self, x: &[Entry<D>], y: &mut Vec<Entry<D>>) {
+        self.multiply(x, y);
+    }
+
+    fn product_work(&self) -> u64 {
+        self.multiply_work()
+    }
+
+    fn matrix(&self) -> &Matrix<D> {
+        self
+    }
+}
+
 /// Vectors of the method, kept from call to call.
 #[derive(Default)]
 pub(super) struct ConjugateGradient<const D: usize> {
@@ -29,7 +55,7 @@ impl<const D: usize> ConjugateGradient<D> {
         self.met_negative_curvature
     }
 
-    /// Solves A x = −g, with a preconditioner that was prepared for A, until the preconditioned residual has shrunk to
+    /// Solves A x = −g, with a preconditioner that was prepared for A or for something like it, until the preconditioned residual has shrunk to
     /// `forcing`, to the cap, to a direction of negative curvature, or until the budget has run out. Answers the number
     /// of iterations.
     ///
@@ -37,7 +63,7 @@ impl<const D: usize> ConjugateGradient<D> {
     /// −g (Nash's and Steihaug's rule).
     pub fn solve(
         &mut self,
-        a: &Matrix<D>,
+        a: &mut impl Operator<D>,
         preconditioner: &impl ApproximateInverse<D>,
         g: &[Entry<D>],
         forcing: f64,
@@ -45,19 +71,19 @@ impl<const D: usize> ConjugateGradient<D> {
         x: &mut Vec<Entry<D>>,
     ) -> usize {
         let cap = iteration_cap(D * g.len());
-        let iteration_work = a.multiply_work() + preconditioner.apply_work(a);
+        let iteration_work = a.product_work() + preconditioner.apply_work(a.matrix());
         self.met_negative_curvature = false;
         x.clear();
         x.resize(g.len(), [0.0; D]);
         self.residual.clear();
         self.residual.extend(g.iter().map(|entry| entry.map(|v| -v)));
         self.preconditioned.clone_from(&self.residual);
-        preconditioner.apply(a, &mut self.preconditioned);
+        preconditioner.apply(a.matrix(), &mut self.preconditioned);
         self.direction.clone_from(&self.preconditioned);
         self.product.resize(g.len(), [0.0; D]);
         let mut rho = inner(&self.residual, &self.preconditioned);
         let goal = forcing * forcing * rho;
-        work.add(preconditioner.apply_work(a));
+        work.add(preconditioner.apply_work(a.matrix()));
         work.vectors(VECTORS_TO_START);
         for iteration in 1..=cap {
             if !work.affords(iteration_work) {
@@ -65,7 +91,7 @@ impl<const D: usize> ConjugateGradient<D> {
             }
             work.add(iteration_work);
             work.vectors(VECTORS_AN_ITERATION);
-            a.multiply(&self.direction, &mut self.product);
+            a.product(&self.direction, &mut self.product);
             let curvature = inner(&self.direction, &self.product);
             let convex = curvature > 0.0;
             if !convex {
@@ -76,7 +102,7 @@ impl<const D: usize> ConjugateGradient<D> {
             add_scaled(x, alpha, &self.direction);
             add_scaled(&mut self.residual, -alpha, &self.product);
             self.preconditioned.clone_from(&self.residual);
-            preconditioner.apply(a, &mut self.preconditioned);
+            preconditioner.apply(a.matrix(), &mut self.preconditioned);
             let next = inner(&self.residual, &self.preconditioned);
             let unsolved = next > goal;
             if !unsolved {
@@ -124,7 +150,7 @@ mod tests {
         let mut solved = Vec::new();
         let mut work = Work::unlimited();
         let mut linear = ConjugateGradient::default();
-        let iterations = linear.solve(matrix, &preconditioner, &g, forcing, &mut work, &mut solved);
+        let iterations = linear.solve(&mut &*matrix, &preconditioner, &g, forcing, &mut work, &mut solved);
         (iterations, largest_difference(&solved, x.as_flattened()))
     }
 
@@ -160,7 +186,7 @@ mod tests {
             let mut preconditioner = Selected::default();
             preconditioner.select(Preconditioner::None, 1.0);
             let mut x = Vec::new();
-            ConjugateGradient::default().solve(&a, &preconditioner, &g, 1e-9, &mut Work::unlimited(), &mut x);
+            ConjugateGradient::default().solve(&mut &a, &preconditioner, &g, 1e-9, &mut Work::unlimited(), &mut x);
             assert!(inner(&g, &x) < 0.0, "{first} {second}: {x:?}");
         }
     }

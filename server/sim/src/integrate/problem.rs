@@ -167,6 +167,16 @@ pub(crate) struct Problem {
     pub figures: Figures,
     /// At the candidate state: one for every unknown, then one for every attachment. After solving, at the end of the tick.
     pub frames: Vec<Frame<f64>>,
+    pub(super) products: ProductMemory,
+}
+
+/// Memory of Hessian products.
+#[derive(Default)]
+pub(super) struct ProductMemory {
+    /// The frames as they move along the vector.
+    moving: Vec<Frame<Dual<1>>>,
+    /// How the gradient on each changes.
+    tangents: Vec<Wrench>,
 }
 
 impl Problem {
@@ -241,17 +251,19 @@ impl Problem {
     /// differentiation along x (talk, "The Cel Damage Solver": a procedural representation of the Hessian), and as
     /// assembled for figures. Unlike the assembled matrix it can be indefinite.
     pub(super) fn hessian_product<const D: usize>(&mut self, x: &[Entry<D>], y: &mut Vec<Entry<D>>) {
-        let Self { dt, unknowns, terms, figures, frames, .. } = self;
+        let Self { dt, unknowns, terms, figures, frames, products, .. } = self;
+        let ProductMemory { moving, tangents } = products;
         y.clear();
         y.extend(unknowns.iter().zip(x).map(|(unknown, x)| unknown.inertia_product(x)));
         figures.begin_hessian();
         figures.assemble(*dt, frames, &mut TimesVector { x, y });
         let along = Propose { step: x, figures, dt: *dt };
-        let moving: Vec<_> =
-            (0..).zip(frames.iter()).map(|(i, frame)| frame.along([along.displacement(i)], *dt)).collect();
-        let mut tangents = vec![Wrench::ZERO; moving.len()];
-        terms.visit(&mut Product { dt: *dt, moving: &moving, tangents: &mut tangents });
-        for (entry, tangent) in y.iter_mut().zip(&tangents) {
+        moving.clear();
+        moving.extend((0..).zip(frames.iter()).map(|(i, frame)| frame.along([along.displacement(i)], *dt)));
+        tangents.clear();
+        tangents.resize(moving.len(), Wrench::ZERO);
+        terms.visit(&mut Product { dt: *dt, moving, tangents });
+        for (entry, tangent) in y.iter_mut().zip(tangents.iter()) {
             add_wrench(entry, *tangent, *dt);
         }
         for (k, tangent) in tangents[x.len()..].iter().enumerate() {

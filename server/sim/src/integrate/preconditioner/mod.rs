@@ -85,7 +85,7 @@ mod tests {
                     a.multiply(&solved, &mut rest);
                     rest.iter_mut().flatten().zip(g.iter().flatten()).for_each(|(r, g)| *r += g);
                     let mut correction = Vec::new();
-                    linear.solve(&a, &prepared(kind, &a), &rest, 1e-9, &mut Work::unlimited(), &mut correction);
+                    linear.solve(&mut &a, &prepared(kind, &a), &rest, 1e-9, &mut Work::unlimited(), &mut correction);
                     solved.iter_mut().flatten().zip(correction.iter().flatten()).for_each(|(s, c)| *s += c);
                 }
                 let error = largest_difference(&solved, x.as_flattened());

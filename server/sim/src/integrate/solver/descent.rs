@@ -160,7 +160,8 @@ impl<const D: usize> Descent<D> {
         if !report.residual.is_finite() {
             return Some(StoppedBecause::NonFinite);
         }
-        if report.residual <= goal.residual {
+        let share = if report.iterations == 0 { GUESS_SHARE } else { 1.0 };
+        if report.residual <= share * goal.residual {
             return Some(StoppedBecause::Tolerance);
         }
         if report.iterations >= goal.iterations {

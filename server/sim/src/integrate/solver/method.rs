@@ -30,6 +30,8 @@ pub enum Method {
     /// Newton with capped conjugate gradients and `preconditioner`. Cel Damage's on the GameCube.
     #[default]
     TruncatedNewton,
+    /// The same with a procedural Hessian: products by automatic differentiation.
+    CelDamage,
 }
 
 /// What conjugate gradients are preconditioned with.
@@ -50,7 +52,7 @@ pub enum Preconditioner {
 
 impl Method {
     /// Every method, with its name.
-    pub const ALL: [(&'static str, Self); 10] = [
+    pub const ALL: [(&'static str, Self); 11] = [
         ("auto", Self::Auto),
         ("jacobi", Self::Jacobi),
         ("gauss_seidel", Self::GaussSeidel),
@@ -61,13 +63,14 @@ impl Method {
         ("discrete_newton", Self::DiscreteNewton),
         ("quasi_newton", Self::QuasiNewton),
         ("truncated_newton", Self::TruncatedNewton),
+        ("cel_damage", Self::CelDamage),
     ];
 
     /// Iterations after which the method gives up, where the settings do not say. Below 8, impacts leave joints open by
     /// centimetres with Newton's; the others take hundreds of cheaper ones.
     pub fn iterations(self) -> usize {
         match self {
-            Self::Auto | Self::Newton | Self::DiscreteNewton | Self::TruncatedNewton => 16,
+            Self::Auto | Self::Newton | Self::DiscreteNewton | Self::TruncatedNewton | Self::CelDamage => 16,
             _ => 1000,
         }
     }

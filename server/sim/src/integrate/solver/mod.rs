@@ -5,6 +5,7 @@
 //! `method`; `auto` chooses by itself. Nothing here knows a potential or a DOF kind.
 
 mod auto;
+mod cel_damage;
 mod descent;
 mod discrete_newton;
 mod gauss_seidel;
@@ -135,6 +136,7 @@ pub(crate) struct Solvers<const D: usize> {
     discrete_newton: discrete_newton::DiscreteNewton<D>,
     quasi_newton: quasi_newton::QuasiNewton<D>,
     truncated_newton: truncated_newton::TruncatedNewton<D>,
+    cel_damage: cel_damage::CelDamage<D>,
 }
 
 impl<const D: usize> Solvers<D> {
@@ -157,6 +159,7 @@ impl<const D: usize> Solvers<D> {
             Method::DiscreteNewton => &mut self.discrete_newton,
             Method::QuasiNewton => &mut self.quasi_newton,
             Method::TruncatedNewton => &mut self.truncated_newton,
+            Method::CelDamage => &mut self.cel_damage,
         };
         (method, &mut self.descent)
     }

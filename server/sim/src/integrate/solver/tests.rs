@@ -161,3 +161,29 @@ fn budgets_are_kept_and_buy_something() {
         }
     }
 }
+
+/// The procedural Hessian is the residual's derivative, by central differences.
+#[test]
+fn products_by_automatic_differentiation_are_those_of_the_hessian() {
+    let mut problem = net(3e3);
+    let u: Vec<Entry<3>> = (0..problem.len()).map(|i| [0.3 * i as f64, -1.0, 0.2]).collect();
+    let x: Vec<Entry<3>> = (0..problem.len()).map(|i| [1.0, 0.5 - 0.2 * i as f64, (i % 3) as f64]).collect();
+    let mut residual_at = |h: f64| {
+        let moved: Vec<Entry<3>> = u.iter().zip(&x).map(|(u, x)| std::array::from_fn(|k| u[k] + h * x[k])).collect();
+        let mut residual = Vec::new();
+        problem.move_to(&moved);
+        problem.evaluate::<3>(&mut residual);
+        residual
+    };
+    let h = 1e-5;
+    let (above, below) = (residual_at(h), residual_at(-h));
+    residual_at(0.0);
+    let mut product = Vec::new();
+    problem.hessian_product(&x, &mut product);
+    for ((above, below), product) in above.iter().zip(&below).zip(&product) {
+        for k in 0..3 {
+            let difference = (above[k] - below[k]) / (2.0 * h);
+            assert!((difference - product[k]).abs() < 1e-6 * (1.0 + product[k].abs()), "{difference} {}", product[k]);
+        }
+    }
+}

@@ -30,7 +30,7 @@ impl<const D: usize> TruncatedNewton<D> {
 
     fn try_to_solve(&mut self, at: &mut Standpoint<D>, step: &mut Vec<Entry<D>>) -> usize {
         at.work.add(self.preconditioner.prepare(at.matrix));
-        self.linear.solve(at.matrix, &self.preconditioner, at.residual, at.settings.forcing, at.work, step)
+        self.linear.solve(&mut &*at.matrix, &self.preconditioner, at.residual, at.settings.forcing, at.work, step)
     }
 }
 

@@ -110,6 +110,11 @@ impl Work {
         self.evaluated();
     }
 
+    /// Multiply-adds of the derivative of an evaluation along a vector: every number is two.
+    pub fn derivative_work(&self) -> u64 {
+        2 * (self.costs.bodies + self.costs.potentials)
+    }
+
     /// The residual was evaluated.
     pub fn evaluated(&mut self) {
         self.evaluations += 1;
