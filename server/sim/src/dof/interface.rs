@@ -230,12 +230,20 @@ impl PointMasses {
     /// Adds the mass matrix `m` over `points`, kg.
     pub fn add<const N: usize>(&mut self, points: [u32; N], m: &[[f64; N]; N]) {
         for (i, &p) in points.iter().enumerate() {
-            self.diagonal[p as usize] += m[i][i];
-            for (j, &q) in points.iter().enumerate().filter(|&(_, &q)| q < p) {
-                match self.off_diagonal.binary_search_by_key(&(p, q), |&(p, q, _)| (p, q)) {
-                    Ok(place) => self.off_diagonal[place].2 += m[i][j],
-                    Err(place) => self.off_diagonal.insert(place, (p, q, m[i][j])),
-                }
+            for (j, &q) in points.iter().enumerate() {
+                self.add_entry(p, q, m[i][j]);
+            }
+        }
+    }
+
+    /// Adds `m`, kg, between points `p` and `q`, where it is in the half that is stored.
+    pub(crate) fn add_entry(&mut self, p: u32, q: u32, m: f64) {
+        if p == q {
+            self.diagonal[p as usize] += m;
+        } else if q < p {
+            match self.off_diagonal.binary_search_by_key(&(p, q), |&(p, q, _)| (p, q)) {
+                Ok(place) => self.off_diagonal[place].2 += m,
+                Err(place) => self.off_diagonal.insert(place, (p, q, m)),
             }
         }
     }

@@ -9,6 +9,7 @@ mod figure;
 pub mod finite_elements;
 mod frame;
 mod interface;
+pub mod natural;
 pub(crate) mod particle;
 pub(crate) mod rigid_body;
 

@@ -12,6 +12,12 @@ use super::super::block::Entry;
 /// Steps of a trial.
 const STEPS: u8 = 2;
 
+/// More steps that it gets as long as each shrinks the residual to [`CONVERGING`] of the last.
+const MORE_STEPS: u8 = 4;
+
+/// Newton's method does better than this near its goal.
+const CONVERGING: f64 = 0.25;
+
 /// A trial is good if it shrinks the residual to this fraction, ...
 const SHRINK: f64 = 0.5;
 
@@ -32,7 +38,10 @@ pub(super) struct Standing {
 pub(super) struct Watchdog<const D: usize> {
     /// It has gone back before, or has nothing to do in this solve.
     tired: bool,
-    steps_left: u8,
+    is_on: bool,
+    steps: u8,
+    /// Residual after the last step, m/s.
+    last: f64,
     /// Where the trial began, and the step that it began with.
     u: Vec<Entry<D>>,
     step: Vec<Entry<D>>,
@@ -53,7 +62,7 @@ pub(super) enum Verdict {
 impl<const D: usize> Watchdog<D> {
     /// Starts a solve; `watches` says whether there is something to watch.
     pub fn begin(&mut self, watches: bool) {
-        (self.tired, self.steps_left) = (!watches, 0);
+        (self.tired, self.is_on) = (!watches, false);
     }
 
     /// Whether the next step is to be taken in full.
@@ -64,27 +73,28 @@ impl<const D: usize> Watchdog<D> {
     /// Hears that a full step from `u`, along which the potential had a `slope`, led to where a line search would have
     /// shortened it.
     pub fn overstepped(&mut self, u: &[Entry<D>], start: Standing, step: &[Entry<D>], slope: f64) {
-        if self.steps_left == 0 {
+        if !self.is_on {
             self.u.clear();
             self.u.extend_from_slice(u);
             self.step.clear();
             self.step.extend_from_slice(step);
-            (self.start, self.slope, self.steps_left) = (start, slope, STEPS);
+            (self.start, self.slope) = (start, slope);
+            (self.is_on, self.steps) = (true, 0);
         }
     }
 
     /// Hears where a step led.
     pub fn judge(&mut self, now: Standing) -> Verdict {
-        if self.steps_left == 0 {
+        if !self.is_on {
             return Verdict::GoOn;
         }
-        self.steps_left -= 1;
+        self.steps += 1;
         let gained = now.merit < self.start.merit + GAIN * self.slope;
         let good = gained || now.residual < SHRINK * self.start.residual;
-        if good {
-            self.steps_left = 0;
-        }
-        if good || self.steps_left > 0 { Verdict::GoOn } else { Verdict::GoBack }
+        let converges = now.residual < CONVERGING * std::mem::replace(&mut self.last, now.residual);
+        let goes_on = self.steps < STEPS || self.steps < STEPS + MORE_STEPS && converges;
+        self.is_on = !good && goes_on;
+        if good || goes_on { Verdict::GoOn } else { Verdict::GoBack }
     }
 
     /// Where the trial began, and its first step; it has been the last one.
@@ -115,6 +125,7 @@ mod tests {
         dog.overstepped(&[[3.0; 3]], at(1.0, 1.0), &[[4.0; 3]], -1.0);
         assert_eq!(dog.judge(at(9.0, 9.0)), Verdict::GoOn);
         dog.overstepped(&[[5.0; 3]], at(9.0, 9.0), &[[6.0; 3]], -1.0);
+        assert_eq!(dog.judge(at(0.8, 0.8)), Verdict::GoOn, "it converges");
         assert_eq!(dog.judge(at(0.8, 0.6)), Verdict::GoBack);
         assert!(dog.is_bold());
         assert_eq!(dog.go_back(), (&[[3.0; 3]][..], &[[4.0; 3]][..]));
