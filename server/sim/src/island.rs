@@ -15,22 +15,9 @@ pub(crate) struct Islands {
     couplings: Vec<(u32, u32)>,
     starts: Vec<u32>,
     members: Vec<u32>,
-    places: Vec<Place>,
+    /// Island of each body, or [`Islands::FREE`].
+    island_of: Vec<u32>,
     scratch: Scratch,
-}
-
-/// Where a body stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Place {
-    /// Its island; [`Place::FREE`] where nothing couples it.
-    pub island: u32,
-    /// Its index there.
-    pub index: u32,
-}
-
-impl Place {
-    /// A body without potentials.
-    pub const FREE: Self = Self { island: u32::MAX, index: u32::MAX };
 }
 
 #[derive(Default)]
@@ -44,6 +31,9 @@ struct Scratch {
 }
 
 impl Islands {
+    /// Island of what is in none.
+    pub const FREE: u32 = u32::MAX;
+
     /// Starts a tick with `bodies` bodies.
     pub fn begin(&mut self, bodies: usize) {
         self.parent.clear();
@@ -66,17 +56,7 @@ impl Islands {
         self.unite(a, b);
     }
 
-    /// A potential acts between everything of `near` and of `far`, within each of them too.
-    pub fn couple_all(&mut self, near: &[u32], far: &[u32]) {
-        let all = || near.iter().chain(far).copied().enumerate();
-        for (i, a) in all() {
-            self.touch(a);
-            all().take(i).filter(|&(_, b)| a != b).for_each(|(_, b)| self.couple(a, b));
-        }
-    }
-
-    /// `a` and `b` are in one island, though nothing may couple them.
-    pub fn unite(&mut self, a: u32, b: u32) {
+    fn unite(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         // The smaller root wins, so that islands are numbered by their first block.
         self.parent[a.max(b) as usize] = a.min(b);
@@ -100,9 +80,9 @@ impl Islands {
         &self.members[self.starts[island] as usize..self.starts[island + 1] as usize]
     }
 
-    /// Island and index of a body.
-    pub fn place(&self, body: u32) -> Place {
-        self.places[body as usize]
+    /// Island of a body; [`Islands::FREE`] where nothing acts on it.
+    pub fn island_of(&self, body: u32) -> u32 {
+        self.island_of[body as usize]
     }
 
     fn root(&mut self, mut i: u32) -> u32 {
@@ -167,8 +147,8 @@ impl Islands {
 
     fn number_islands(&mut self) {
         let n = self.parent.len();
-        self.places.clear();
-        self.places.resize(n, Place::FREE);
+        self.island_of.clear();
+        self.island_of.resize(n, Self::FREE);
         self.starts.clear();
         self.starts.push(0);
         let mut island_of_root = std::mem::take(&mut self.scratch.island_of_root);
@@ -184,7 +164,7 @@ impl Islands {
                 self.starts.push(0);
             }
             let island = island_of_root[root as usize];
-            self.places[i as usize].island = island;
+            self.island_of[i as usize] = island;
             self.starts[island as usize + 1] += 1;
         }
         for island in 0..self.len() {
@@ -196,10 +176,9 @@ impl Islands {
         counts.clear();
         counts.resize(self.starts.len(), 0);
         for &i in &self.scratch.elimination {
-            let place = &mut self.places[i as usize];
-            let count = &mut counts[place.island as usize];
-            place.index = *count;
-            self.members[(self.starts[place.island as usize] + *count) as usize] = i;
+            let island = self.island_of[i as usize] as usize;
+            let count = &mut counts[island];
+            self.members[(self.starts[island] + *count) as usize] = i;
             *count += 1;
         }
         self.scratch.island_of_root = island_of_root;
@@ -225,8 +204,7 @@ mod tests {
             assert_eq!(members.len(), 5);
             assert!(members.iter().position(|&m| m == 1).unwrap() >= 3, "{members:?}");
             assert_eq!(islands.members(1), [7]);
-            assert_eq!(islands.place(5), Place::FREE);
-            assert_eq!(islands.place(7), Place { island: 1, index: 0 });
+            assert_eq!((islands.island_of(5), islands.island_of(7)), (Islands::FREE, 1));
         }
     }
 }

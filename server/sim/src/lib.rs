@@ -20,6 +20,7 @@ pub mod autodiff;
 pub mod collide;
 pub mod dof;
 mod eigen;
+mod elimination;
 mod error;
 pub mod integrate;
 mod island;

@@ -7,6 +7,7 @@ use glam::{DMat3, DQuat, DVec3};
 use super::interface::{BLOCK_RATES_MAX, Dof, Inertia, LocalState, PartPoint};
 use super::{Motion, Pose};
 use crate::collide::Collider;
+use crate::elimination::minimum_degree;
 use crate::error::{LARGEST, SimError, require};
 use crate::integrate::figure::part_momentum;
 use crate::potential::hold::Memory;
@@ -43,6 +44,8 @@ pub(crate) struct FigureBody {
     pub change: Vec<f64>,
     /// What resists each rate at the start, kg or kg m².
     pub masses: Vec<f64>,
+    /// In which order its blocks are eliminated: the place of each among them.
+    pub ranks: Vec<u32>,
     /// kg.
     pub mass: f64,
     /// Of each of the kind's rods.
@@ -100,7 +103,8 @@ impl FigureBody {
         let masses = masses(&*desc.dof, &desc.q);
         let (controls, change) = (desc.dof.controls(), vec![0.0; desc.v.len()]);
         let rods = vec![Memory::default(); desc.dof.rods().len()];
-        Self { controls, change, masses, mass, rods, dof: desc.dof, colliders: desc.colliders }
+        let ranks = minimum_degree(desc.dof.blocks().len(), &couplings(&*desc.dof, &desc.q));
+        Self { controls, change, masses, ranks, mass, rods, dof: desc.dof, colliders: desc.colliders }
     }
 
     /// Pose of the frame at a material point.
@@ -154,6 +158,26 @@ impl FigureBody {
             }
         }
     }
+}
+
+/// Pairs of blocks that inertia and own potentials couple.
+fn couplings(dof: &dyn Dof, q: &[f64]) -> Vec<(u32, u32)> {
+    let mut pairs: Vec<_> = dof.rods().iter().map(|rod| (rod.points[0], rod.points[1])).collect();
+    dof.couplings(&mut |a, b| pairs.push((a as u32, b as u32)));
+    match dof.inertia() {
+        Inertia::Points(masses) => pairs.extend(masses.off_diagonal.iter().map(|&(a, b, _)| (a, b))),
+        Inertia::Parts(parts) => {
+            for (part, inertia) in (0..).zip(parts) {
+                let mut movers = Vec::new();
+                let at = PartPoint { part, point: inertia.centre };
+                dof.jacobian(at, q, &mut |block, _| movers.push(block as u32));
+                for (i, &a) in movers.iter().enumerate() {
+                    pairs.extend(movers[..i].iter().map(|&b| (a, b)));
+                }
+            }
+        }
+    }
+    pairs
 }
 
 /// The diagonal of the mass matrix at `q`.

@@ -86,6 +86,11 @@ impl Figures {
         &self.list[..self.used]
     }
 
+    /// Whether there are figures whose points carry the mass.
+    pub fn have_points(&self) -> bool {
+        self.list().iter().any(|figure| matches!(figure.dof.inertia(), Inertia::Points(_)))
+    }
+
     /// Adds a figure with blocks at `blocks`. Answers its index.
     pub fn add(&mut self, body: &FigureBody, blocks: impl Iterator<Item = u32>, [q, v]: [&[f64]; 2], dt: f64) -> u32 {
         if self.used == self.list.len() {

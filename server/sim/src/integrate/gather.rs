@@ -6,7 +6,7 @@ use super::problem::{Rates, Unknown};
 use super::step::{Integrator, Scene, Solve};
 use crate::collide::{ContactPoint, Partner};
 use crate::dof::{ABSENT, BLOCK_RATES_MAX, BodyId, FigureBody, Frame, Inertia, Node, PartPoint, Placed, Twist};
-use crate::island::Place;
+use crate::island::Islands;
 use crate::potential::axle::AxleTerm;
 use crate::potential::ball_joint::BallJointTerm;
 use crate::potential::contact::{Approach, ContactTerm};
@@ -23,6 +23,8 @@ pub(super) struct Active {
     pub id: BodyId,
     /// Its first block among all unknowns.
     pub first: u32,
+    /// Its first block in its island; [`ABSENT`] where nothing acts on it.
+    pub start: u32,
     /// Its index among the figures of its island; [`ABSENT`] for particles and rigid bodies.
     pub figure: u32,
 }
@@ -51,7 +53,8 @@ impl Integrator {
             let body = &mut scene.bodies[id];
             body.index = if body.quarantined { ABSENT } else { self.active.len() as u32 };
             if !body.quarantined {
-                self.active.push(Active { id, first: self.unknowns.len() as u32, figure: ABSENT });
+                let first = self.unknowns.len() as u32;
+                self.active.push(Active { id, first, start: ABSENT, figure: ABSENT });
                 match &body.figure {
                     None => self.unknowns.push(Unknown::Body(body.node(scene.state, dt, gravity))),
                     Some(figure) => {
@@ -66,114 +69,47 @@ impl Integrator {
     }
 
     pub(super) fn build_islands(&mut self, scene: &Scene) {
-        self.islands.begin(self.unknowns.len());
-        self.couple_figures(scene);
+        self.islands.begin(self.active.len());
+        let figures = (0..).zip(&self.active).filter(|(_, active)| scene.bodies[active.id].figure.is_some());
+        figures.for_each(|(index, _)| self.islands.touch(index));
         let contacts = scene.contacts.iter().map(|c| contact_spots(scene, c));
         let anchors = scene.potentials.pairs().map(|[a, b]| Some([spot(scene, a)?, spot(scene, b)?]));
-        let (mut near, mut far) = (std::mem::take(&mut self.scratch[0]), std::mem::take(&mut self.scratch[1]));
-        for [a, b] in contacts.chain(anchors).flatten() {
-            self.blocks_at(scene, a, &mut near);
-            self.blocks_at(scene, b, &mut far);
-            self.islands.couple_all(&near, &far);
+        for spots in contacts.chain(anchors).flatten() {
+            match spots {
+                [Spot::Body(a, _), Spot::Body(b, _)] => self.islands.couple(a, b),
+                [Spot::Body(a, _), Spot::World] | [Spot::World, Spot::Body(a, _)] => self.islands.touch(a),
+                [Spot::World, Spot::World] => {}
+            }
         }
-        self.scratch = [near, far];
         self.islands.finish();
         self.solves.resize_with(self.islands.len().max(self.solves.len()), Solve::default);
-        for (i, solve) in self.solves.iter_mut().take(self.islands.len()).enumerate() {
+        for (island, solve) in self.solves.iter_mut().take(self.islands.len()).enumerate() {
             solve.clear(scene.settings);
-            let members = self.islands.members(i).iter();
-            solve.problem.unknowns.extend(members.map(|&m| self.unknowns[m as usize]));
-        }
-        for active in &self.active {
-            if let Some(solve) = self.solves.get_mut(self.islands.place(active.first).island as usize) {
-                solve.mass += scene.bodies[active.id].mass;
-            }
-        }
-        self.place_figures(scene);
-    }
-
-    /// A figure's blocks are one island, whatever couples them.
-    fn couple_figures(&mut self, scene: &Scene) {
-        for active in &self.active {
-            let Some(FigureBody { dof, .. }) = &scene.bodies[active.id].figure else { continue };
-            let islands = &mut self.islands;
-            for i in 0..dof.blocks().len() as u32 {
-                islands.touch(active.first + i);
-                islands.unite(active.first, active.first + i);
-            }
-            let mut couple = |a: u32, b: u32| islands.couple(active.first + a, active.first + b);
-            dof.rods().iter().for_each(|rod| couple(rod.points[0], rod.points[1]));
-            dof.couplings(&mut |a, b| couple(a as u32, b as u32));
-            match dof.inertia() {
-                Inertia::Points(masses) => masses.off_diagonal.iter().for_each(|&(a, b, _)| couple(a, b)),
-                Inertia::Parts(parts) => {
-                    let q = scene.state.q(scene.bodies[active.id].slice);
-                    for (part, inertia) in (0..).zip(parts) {
-                        let mut movers = std::mem::take(&mut self.scratch[0]);
-                        movers.clear();
-                        let at = PartPoint { part, point: inertia.centre };
-                        dof.jacobian(at, q, &mut |block, _| movers.push(block as u32));
-                        for (i, &a) in movers.iter().enumerate() {
-                            movers[..i].iter().for_each(|&b| couple(a, b));
-                        }
-                        self.scratch[0] = movers;
-                    }
-                }
-            }
-        }
-    }
-
-    /// Hands every figure to its island's problem.
-    fn place_figures(&mut self, scene: &Scene) {
-        let Settings { dt, gravity, .. } = *scene.settings;
-        for active in &mut self.active {
-            let body = &scene.bodies[active.id];
-            let Some(figure) = &body.figure else { continue };
-            let island = self.islands.place(active.first).island;
-            let figures = &mut self.solves[island as usize].problem.figures;
-            let blocks = (active.first..).take(figure.dof.blocks().len());
-            let blocks = blocks.map(|block| self.islands.place(block).index);
-            let state = [scene.state.q(body.slice), scene.state.v(body.slice)];
-            active.figure = figures.add(figure, blocks, state, dt);
-            figures.attach_parts(active.figure, dt, gravity);
-        }
-    }
-
-    /// The blocks, among all unknowns, that move a spot.
-    fn blocks_at(&self, scene: &Scene, spot: Spot, blocks: &mut Vec<u32>) {
-        blocks.clear();
-        let Spot::Body(index, at) = spot else { return };
-        let Active { id, first, .. } = self.active[index as usize];
-        let body = &scene.bodies[id];
-        match &body.figure {
-            None => blocks.push(first),
-            Some(figure) => {
-                let q = scene.state.q(body.slice);
-                figure.dof.jacobian(at, q, &mut |block, _| blocks.push(first + block as u32));
+            for &member in self.islands.members(island) {
+                let active = &mut self.active[member as usize];
+                solve.take_in(active, &self.unknowns, scene);
             }
         }
     }
 
     /// The island of two spots, and their ends in it. `frozen` ends keep the derivatives of the start.
     fn localise(&mut self, spots: [Spot; 2], frozen: bool) -> Option<(&mut Solve, [End; 2])> {
-        let place = |spot: Spot| match spot {
-            Spot::World => Place::FREE,
-            Spot::Body(index, _) => self.islands.place(self.active[index as usize].first),
+        let island = |spot: Spot| match spot {
+            Spot::World => Islands::FREE,
+            Spot::Body(index, _) => self.islands.island_of(index),
         };
-        let places = spots.map(place);
-        let island = places[0].island.min(places[1].island);
-        let solve = self.solves.get_mut(island as usize)?;
-        let mut end = |spot: Spot, place: Place| match spot {
+        let solve = self.solves.get_mut(island(spots[0]).min(island(spots[1])) as usize)?;
+        let mut end = |spot: Spot| match spot {
             Spot::World => End { frame: FIXED, point: DVec3::ZERO },
-            Spot::Body(index, at) => match self.active[index as usize].figure {
-                ABSENT => End { frame: place.index, point: at.point },
-                figure => {
+            Spot::Body(index, at) => match self.active[index as usize] {
+                Active { start, figure: ABSENT, .. } => End { frame: start, point: at.point },
+                Active { figure, .. } => {
                     let attachment = solve.problem.figures.attach(figure, at, frozen);
                     End { frame: solve.problem.len() as u32 + attachment, point: DVec3::ZERO }
                 }
             },
         };
-        let ends = [end(spots[0], places[0]), end(spots[1], places[1])];
+        let ends = spots.map(&mut end);
         Some((solve, ends))
     }
 
@@ -233,15 +169,15 @@ impl Integrator {
 
     /// The rods between points of figures: a point's block is its frame.
     fn gather_own_rods(&mut self, scene: &Scene) {
-        for active in &self.active {
+        for (active, index) in self.active.iter().zip(0..) {
             let body = &scene.bodies[active.id];
             let Some(figure) = &body.figure else { continue };
+            let solve = &mut self.solves[self.islands.island_of(index) as usize];
             let q = scene.state.q(body.slice);
             let rods = (0u32..).zip(figure.dof.rods()).zip(&figure.rods);
             for ((index, rod), &memory) in rods {
-                let places = rod.points.map(|point| self.islands.place(active.first + point));
-                let solve = &mut self.solves[places[0].island as usize];
-                let ends = places.map(|place| End { frame: place.index, point: DVec3::ZERO });
+                let frames = rod.points.map(|point| active.start + figure.ranks[point as usize]);
+                let ends = frames.map(|frame| End { frame, point: DVec3::ZERO });
                 let points = rod.points.map(|point| DVec3::from_slice(&q[3 * point as usize..]));
                 let scale = solve.scale(ends, points, scene.settings.solver.joint_stiffness);
                 solve.problem.terms.own_rods.push(RodTerm::new(ends, rod.length, rod.tolerance, scale, memory));
@@ -270,6 +206,25 @@ impl Integrator {
 }
 
 impl Solve {
+    /// Takes a body into the island, with its share of all `unknowns`.
+    fn take_in(&mut self, active: &mut Active, unknowns: &[Unknown], scene: &Scene) {
+        let body = &scene.bodies[active.id];
+        let start = self.problem.unknowns.len();
+        active.start = start as u32;
+        self.mass += body.mass;
+        let unknowns = &unknowns[active.first as usize..];
+        let Some(figure) = &body.figure else { return self.problem.unknowns.push(unknowns[0]) };
+        self.problem.unknowns.extend_from_slice(&unknowns[..figure.ranks.len()]);
+        for (&rank, &unknown) in figure.ranks.iter().zip(unknowns) {
+            self.problem.unknowns[start + rank as usize] = unknown;
+        }
+        let Settings { dt, gravity, .. } = *scene.settings;
+        let state = [scene.state.q(body.slice), scene.state.v(body.slice)];
+        let blocks = figure.ranks.iter().map(|rank| active.start + rank);
+        active.figure = self.problem.figures.add(figure, blocks, state, dt);
+        self.problem.figures.attach_parts(active.figure, dt, gravity);
+    }
+
     /// The particle or rigid body of a frame.
     fn node(&self, frame: u32) -> Option<&Node> {
         match self.problem.unknowns.get(frame as usize) {

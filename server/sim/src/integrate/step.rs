@@ -61,7 +61,6 @@ pub(crate) struct Integrator {
     /// Bodies that take part, in order of serial.
     pub(super) active: Vec<Active>,
     pub(super) solves: Vec<Solve>,
-    pub(super) scratch: [Vec<u32>; 2],
     pool: Option<rayon::ThreadPool>,
 }
 
@@ -128,13 +127,12 @@ impl Integrator {
     fn scatter(&mut self, scene: &mut Scene) -> StepReport {
         let mut report = StepReport::default();
         self.sum_up(&mut report);
-        for active in &self.active {
-            let place = self.islands.place(active.first);
-            let problem = self.solves.get(place.island as usize).map(|solve| &solve.problem);
+        for (active, index) in self.active.iter().zip(0..) {
+            let problem = self.solves.get(self.islands.island_of(index) as usize).map(|solve| &solve.problem);
             let body = &mut scene.bodies[active.id];
             match (&self.unknowns[active.first as usize], problem) {
                 (Unknown::Body(node), problem) => {
-                    let twist = problem.map_or(node.target, |p| p.frames[place.index as usize].twist());
+                    let twist = problem.map_or(node.target, |p| p.frames[active.start as usize].twist());
                     let start = node.start;
                     body.advance(node, twist, scene.settings.dt, scene.state);
                     let linear = twist.linear - node.target.linear;
