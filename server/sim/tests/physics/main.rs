@@ -10,6 +10,7 @@ mod joints;
 mod natural;
 mod own_kind;
 mod sheep;
+mod sheep_forms;
 mod solvers;
 mod tolerance;
 
