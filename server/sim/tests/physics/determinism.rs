@@ -1,10 +1,11 @@
 //! Same calls, same bits: from run to run, and whatever the number of threads.
 
-use pita_sim::{Anchor, BallJointDesc, DVec3, Settings, Shape, World};
+use pita_sim::{Anchor, BallJointDesc, DQuat, DVec3, Settings, Shape, World};
 
+use super::sheep::{PARTS, add_articulated, coordinates};
 use super::{DT, body, ground};
 
-/// Some heaps of boxes with balls on strings, thrown about.
+/// Some heaps of boxes with balls on strings, thrown about, and a sheep on each.
 fn heaps(threads: usize) -> World {
     let mut world = World::new(Settings { threads, ..Settings::at(DT) }).unwrap();
     ground(&mut world);
@@ -17,6 +18,8 @@ fn heaps(threads: usize) -> World {
                 let ball = body(&mut world, Shape::Ball { radius: 0.2 }, 5.0, position + DVec3::Z * 1.5, 0.5);
                 let (a, b) = (Anchor::body(cube, DVec3::Z * 0.75), Anchor::body(ball, DVec3::Z * -0.75));
                 world.add_ball_joint(BallJointDesc::new(a, b)).unwrap();
+                let poses = PARTS.each_ref().map(|part| (position + DVec3::Y * 2.0 + part.centre, DQuat::IDENTITY));
+                add_articulated(&mut world, coordinates(&poses), true);
             }
         }
     }

@@ -1,11 +1,15 @@
 //! What must not hurt: bad arguments, stale handles, absurd speeds.
 
+use std::sync::Arc;
+
+use pita_sim::mass::Density;
 use pita_sim::{
-    Anchor, AxleControl, AxleDesc, BallJointDesc, Collider, DQuat, DVec3, ParticleDesc, RigidBodyDesc, Settings, Shape,
-    SimError, SpringDesc, StaticDesc, World,
+    Anchor, Articulated, AxleControl, AxleDesc, BallJointDesc, Collider, DQuat, DVec3, FigureDesc, JointDesc,
+    JointDrive, JointKind, JointLimit, JointMotor, PartDesc, ParticleDesc, RigidBodyDesc, Settings, Shape, SimError,
+    SpringDesc, StaticDesc, World,
 };
 
-use super::{cube, ground, particle, world};
+use super::{DT, cube, ground, particle, world};
 
 fn refused<T>(result: Result<T, SimError>, expected: &str) {
     match result {
@@ -96,6 +100,49 @@ fn absurd_motion_is_survived() {
     let here = world.position(bystander).unwrap();
     assert!((here - DVec3::new(-50.0, 0.5, 0.0)).length() < 1e-2, "{here}");
     assert!(world.slices().all(|slice| slice.q.iter().chain(slice.v).all(|x| x.is_finite())));
+}
+
+/// Articulated figures with the fastest rates that are accepted, with motors that ask for the impossible, and with parts
+/// a million times as heavy as those that carry them: nothing becomes non-finite, and the neighbours do not notice.
+#[test]
+fn absurd_figures_are_survived() {
+    let kinds = [
+        JointKind::Hinge { axis: DVec3::Z },
+        JointKind::Universal { axes: [DVec3::X, DVec3::Y] },
+        JointKind::Ball,
+        JointKind::Slider { axis: DVec3::X },
+        JointKind::Free,
+    ];
+    for (speed, heavy) in [(1e8, 1.0), (1e3, 1e6), (30.0, 1e6)] {
+        let mut world = world();
+        let bystander = cube(&mut world, DVec3::new(-50.0, 100.0, 0.0));
+        let part = |(i, kind): (u32, JointKind)| {
+            let drive = JointDrive::Position { frequency: 2.0, damping_ratio: 1.0 };
+            let motor = (kind != JointKind::Free).then_some(JointMotor { drive, max_force: f64::INFINITY });
+            let limits = vec![JointLimit::range(-1e-3, 1e-3); usize::from(matches!(kind, JointKind::Hinge { .. }))];
+            let joint = JointDesc { motor, limits, ..JointDesc::new(kind).at(DVec3::X * 0.5, DVec3::X * -0.5) };
+            let unit = Shape::Box { half: DVec3::splat(0.3) }.mass_properties(Density::constant(1.0)).unwrap();
+            let mass = unit.scaled_to(if i == 4 { heavy } else { 1.0 }).unwrap();
+            PartDesc { name: format!("link {i}"), mass, parent: i.checked_sub(1), joint }
+        };
+        let figure = Articulated::new((0..).zip(kinds).map(part).collect()).unwrap();
+        let (q, mut v) = (figure.rest(), figure.still());
+        v.iter_mut().enumerate().for_each(|(i, v)| *v = if i % 2 == 0 { speed } else { -speed });
+        let figure = world.add_figure(FigureDesc { dof: Arc::new(figure), q, v, colliders: Vec::new() }).unwrap();
+        let mut controls = world.controls(figure).unwrap().to_vec();
+        controls[0] = 1e8;
+        world.set_controls(figure, &controls).unwrap();
+        controls[0] = f64::NAN;
+        refused(world.set_controls(figure, &controls), "NaN");
+        refused(world.set_controls(figure, &controls[1..]), "as many as the body has");
+        for _ in 0..60 {
+            world.step();
+        }
+        let fallen = 9.81 * DT * DT * 60.0 * 61.0 / 2.0;
+        assert!((world.position(bystander).unwrap().y - 100.0 + fallen).abs() < 1e-9);
+        assert!(world.slices().all(|slice| slice.q.iter().chain(slice.v).all(|x| x.is_finite())));
+        assert!(speed > 1e7 || !world.is_quarantined(figure), "{speed} {heavy}");
+    }
 }
 
 /// A body that is pushed out of all bounds is quarantined alone: what hangs on it and what stands by go on, its forces do

@@ -11,7 +11,9 @@
 //! θ a tick about a joint, an off-axis mass turns by θ' = θ cos θ' ≈ θ − θ³/2 in the next one: at 1 rad/s (θ = 1/30) it
 //! loses 1.6 % in a second, at 10 rad/s half. Gyroscopic torques are implicit too, and a
 //! part that tumbles about its middle axis loses energy, unlike a rigid body, whose free flight is predicted.
-//! Energy falls, at any stiffness; it never rises but by what the solver's tolerance leaves.
+//! Energy falls; it never rises but by what the solver's tolerance leaves. Where a part spins by more than about a radian
+//! a tick about its axis of least inertia, Newton no longer converges in its iterations: the state stays bounded, the
+//! report says so. What has to spin fast and long, a wheel, is a hinge through its centre of mass, or a rigid body.
 //!
 //! Owns kinematics, inertia and own potentials of such figures; knows nothing of worlds and islands.
 

@@ -250,3 +250,57 @@ fn states_that_are_none_are_refused() {
     assert!(world.set_slice(id, &q, &figure.still()).is_err());
     assert!(world.set_slice(id, &figure.rest(), &figure.still()).is_ok());
 }
+
+/// Links along x whose ends are pulled outwards: there the geometric stiffness is positive, and all of it is handed over.
+/// Σ impulse · x is then flat to first order, and its second differences over the joints' rates are Jᵀ G J.
+#[test]
+fn geometric_stiffness_is_the_second_difference_of_what_pulls() {
+    for kind in
+        [JointKind::Hinge { axis: DVec3::Z }, JointKind::Ball, JointKind::Universal { axes: [DVec3::Y, DVec3::Z] }]
+    {
+        let link = |i: u32| {
+            let in_parent = if i == 0 { DVec3::ZERO } else { DVec3::X * 0.7 };
+            part("link", i.checked_sub(1), JointDesc::new(kind).at(in_parent, DVec3::X * -0.3))
+        };
+        let figure = Articulated::new((0..4).map(link).collect()).unwrap();
+        // The tip as well, beyond the centres of mass.
+        let loads: Vec<_> = (0..4).map(|part| (part, DVec3::ZERO)).chain([(3, DVec3::X * 0.5)]).collect();
+        let pulls = [2.0, 1.0, 3.0, 0.5, 4.0].map(|pull| DVec3::X * -pull);
+        let place = |q: &[f64]| -> f64 {
+            let at =
+                |&(part, point): &(u32, DVec3)| figure.frame(PartPoint { part, point }, q, &figure.still()).position;
+            loads.iter().map(at).zip(pulls).map(|(x, pull)| pull.dot(x.into())).sum()
+        };
+        let (q, n) = (figure.rest(), figure.still().len());
+        let h = 1e-3;
+        let moved = |i: usize, j: usize, a: f64, b: f64| {
+            let (mut v, mut q1) = (vec![0.0; n], q.clone());
+            v[i] += a * h;
+            v[j] += b * h;
+            figure.step(&q, &v, 1.0, &mut q1);
+            place(&q1)
+        };
+        let mut stiffness = vec![DMat3::ZERO; 4];
+        let centres: Vec<_> =
+            (0..4).map(|part| figure.frame(PartPoint { part, point: DVec3::ZERO }, &q, &figure.still())).collect();
+        let mut pulled: Vec<_> = loads
+            .iter()
+            .zip(pulls)
+            .map(|(&(part, point), impulse)| PartLoad { at: PartPoint { part, point }, impulse })
+            .collect();
+        figure.geometric_stiffness(&q, &centres, &mut pulled, &mut |part, g| stiffness[part] += g);
+        let mut turns = vec![vec![DVec3::ZERO; n]; 4];
+        for (part, turns) in (0..).zip(&mut turns) {
+            figure.jacobian(PartPoint { part, point: DVec3::ZERO }, &q, &mut |block, columns| {
+                figure.rates_of(block).zip(columns).for_each(|(i, c)| turns[i] = DVec3::from_slice(&c[3..]));
+            });
+        }
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let second =
+                moved(i, j, 1.0, 1.0) - moved(i, j, 1.0, -1.0) - moved(i, j, -1.0, 1.0) + moved(i, j, -1.0, -1.0);
+            let expected = second / (4.0 * h * h);
+            let found: f64 = stiffness.iter().zip(&turns).map(|(g, turns)| turns[i].dot(*g * turns[j])).sum();
+            assert!((found - expected).abs() < 1e-4, "{kind:?} ({i}, {j}): {found} {expected}");
+        }
+    }
+}
