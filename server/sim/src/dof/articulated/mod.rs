@@ -9,8 +9,11 @@
 //! the tick, R = Σ J1ᵀ [P(Q1, Q1') − P(Q0, Q0') − W dt]. Linear momentum is exact to the solver's tolerance. Angular
 //! momentum is not: what goes round a joint keeps of its velocity the part that is along its new direction. Turning by
 //! θ a tick about a joint, an off-axis mass turns by θ' = θ cos θ' ≈ θ − θ³/2 in the next one: at 1 rad/s (θ = 1/30) it
-//! loses 1.6 % in a second, at 10 rad/s half. Gyroscopic torques are implicit too, and a
-//! part that tumbles about its middle axis loses energy, unlike a rigid body, whose free flight is predicted.
+//! loses 1.6 % in a second, at 10 rad/s half. What a part spins about its own centre of mass does not decay so; but
+//! gyroscopic torques are implicit too, and a part that tumbles loses energy, unlike a rigid body, whose free flight is
+//! predicted. So a sheep of four rigid bodies tumbles on, one in independent coordinates comes to spin about what resists
+//! most, and one in natural coordinates stops spinning first.
+//!
 //! Energy falls; it never rises but by what the solver's tolerance leaves. Where a part spins by more than about a radian
 //! a tick about its axis of least inertia, Newton no longer converges in its iterations: the state stays bounded, the
 //! report says so. What has to spin fast and long, a wheel, is a hinge through its centre of mass, or a rigid body.
