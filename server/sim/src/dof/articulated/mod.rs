@@ -10,9 +10,9 @@
 //! momentum is not: what goes round a joint keeps of its velocity the part that is along its new direction. Turning by
 //! θ a tick about a joint, an off-axis mass turns by θ' = θ cos θ' ≈ θ − θ³/2 in the next one: at 1 rad/s (θ = 1/30) it
 //! loses 1.6 % in a second, at 10 rad/s half. What a part spins about its own centre of mass does not decay so; but
-//! gyroscopic torques are implicit too, and a part that tumbles loses energy, unlike a rigid body, whose free flight is
-//! predicted. So a sheep of four rigid bodies tumbles on, one in independent coordinates comes to spin about what resists
-//! most, and one in natural coordinates stops spinning first.
+//! gyroscopic torques are implicit too, and a part that tumbles loses energy, unlike a free rigid body, whose flight is
+//! predicted. Of the three forms of the sheep this one tumbles longest: thrown with 7 rad/s it has 81 % of its angular
+//! momentum after a second, rigid bodies on ball joints, which lose θ³ a tick, 68 %, natural coordinates 54 %.
 //!
 //! Energy falls; it never rises but by what the solver's tolerance leaves. Where a part spins by more than about a radian
 //! a tick about its axis of least inertia, Newton no longer converges in its iterations: the state stays bounded, the
