@@ -36,6 +36,7 @@ pub use dof::articulated::{
     Articulated, JointDesc, JointDrive, JointKind, JointLimit, JointMotor, JointSpring, LimitRange, PartDesc,
 };
 pub use dof::finite_elements::FiniteElements;
+pub use dof::lattice::{Lattice, LatticeDesc, RestShape};
 pub use dof::natural::{Natural, NaturalDesc, NaturalPart};
 pub use dof::{BodyId, Dof, DofKind, FigureDesc, Frame, PartCollider, PartPoint, ParticleDesc, RigidBodyDesc};
 pub use error::SimError;

@@ -12,12 +12,11 @@
 //!
 //! Owns kinematics, inertia and elasticity of such bodies; knows nothing of worlds and islands.
 
-use std::collections::BTreeMap;
-
 use glam::{DMat3, DQuat, DVec3};
 
 use super::embedding::Embedding;
 use super::interface::{BlockSize, Columns, Dof, Inertia, LocalState, PartPoint, PointMasses};
+use super::nodal::{SharedMass, Slot};
 use super::{DofKind, Frame};
 use crate::error::{SimError, require};
 use crate::mass::{Density, tetrahedron_mass};
@@ -49,19 +48,6 @@ struct Element {
     slots: [Slot; NODE_PAIRS.len()],
 }
 
-/// Where the stiffness between two nodes goes.
-#[derive(Clone, Copy, Debug)]
-enum Slot {
-    /// Nowhere: a node is fixed.
-    Nowhere,
-    /// A node with itself.
-    Own(u32),
-    /// A pair of the mass matrix, in its order.
-    Pair(u32),
-    /// A pair that the mass matrix has the other way round.
-    Transposed(u32),
-}
-
 impl FiniteElements {
     /// A body of a mesh. The nodes `fixed` stay where the mesh has them.
     ///
@@ -72,7 +58,7 @@ impl FiniteElements {
         let (places, moving) = places(mesh.nodes().len(), fixed)?;
         let mut rest = vec![DVec3::ZERO; mesh.nodes().len()];
         mesh.nodes().iter().zip(&places).for_each(|(&node, &place)| rest[place as usize] = node);
-        let mut shared = SharedMass { diagonal: vec![0.0; moving], off_diagonal: BTreeMap::new() };
+        let mut shared = SharedMass::new(moving);
         let mut elements = Vec::with_capacity(mesh.elements().len());
         for (index, nodes) in mesh.elements().iter().enumerate() {
             let corners = mesh.corners(index);
@@ -218,38 +204,13 @@ impl Dof for FiniteElements {
         for element in &self.elements {
             let x = self.positions(element, at.q1);
             let mut add = |blocks: NodeBlocks| {
-                for (slot, block) in element.slots.iter().zip(blocks) {
-                    match *slot {
-                        Slot::Nowhere => {}
-                        Slot::Own(i) => own[i as usize] += block,
-                        Slot::Pair(k) => pairs[k as usize] += block,
-                        Slot::Transposed(k) => pairs[k as usize] += block.transpose(),
-                    }
-                }
+                element.slots.iter().zip(blocks).for_each(|(slot, block)| slot.add(block, own, pairs));
             };
             add(element.tetrahedron.stiffness(&self.material, x, curvature));
             if let Some(viscosity) = &viscosity {
                 let before = self.positions(element, at.q0);
                 add(element.tetrahedron.damping_stiffness(viscosity, before, x, curvature));
             }
-        }
-    }
-}
-
-impl Slot {
-    /// Of the block at row `a`, column `b`.
-    fn between(masses: &PointMasses, a: u32, b: u32) -> Self {
-        if a.max(b) as usize >= masses.diagonal.len() {
-            return Self::Nowhere;
-        }
-        if a == b {
-            return Self::Own(a);
-        }
-        let pair = (a.max(b), a.min(b));
-        match masses.off_diagonal.binary_search_by_key(&pair, |&(i, j, _)| (i, j)) {
-            Ok(k) if a > b => Self::Pair(k as u32),
-            Ok(k) => Self::Transposed(k as u32),
-            Err(_) => Self::Nowhere,
         }
     }
 }
@@ -271,32 +232,4 @@ fn places(nodes: usize, fixed: &[u32]) -> Result<(Vec<u32>, usize), SimError> {
         std::mem::replace(counter, *counter + 1)
     });
     Ok((places.collect(), moving))
-}
-
-/// A mass matrix that is being summed up.
-struct SharedMass {
-    diagonal: Vec<f64>,
-    off_diagonal: BTreeMap<(u32, u32), f64>,
-}
-
-impl SharedMass {
-    /// Adds an element's. What a node shares with a fixed one is its own: its weight stays what it was.
-    fn add(&mut self, nodes: [u32; 4], m: &[[f64; 4]; 4]) {
-        let moves = |node: u32| (node as usize) < self.diagonal.len();
-        let moving = nodes.map(moves);
-        for (i, &a) in nodes.iter().enumerate().filter(|&(i, _)| moving[i]) {
-            for (j, &b) in nodes.iter().enumerate() {
-                if i == j || !moving[j] {
-                    self.diagonal[a as usize] += m[i][j];
-                } else if a > b {
-                    *self.off_diagonal.entry((a, b)).or_default() += m[i][j];
-                }
-            }
-        }
-    }
-
-    fn finish(self) -> PointMasses {
-        let off_diagonal = self.off_diagonal.into_iter().map(|((i, j), m)| (i, j, m)).collect();
-        PointMasses { diagonal: self.diagonal, off_diagonal }
-    }
 }

@@ -9,7 +9,9 @@ mod figure;
 pub mod finite_elements;
 mod frame;
 mod interface;
+pub mod lattice;
 pub mod natural;
+mod nodal;
 pub(crate) mod particle;
 pub(crate) mod rigid_body;
 

@@ -7,6 +7,7 @@ mod determinism;
 mod elasticity;
 mod hostile;
 mod joints;
+mod lattice;
 mod natural;
 mod own_kind;
 mod sheep;

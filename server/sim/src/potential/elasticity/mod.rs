@@ -6,6 +6,7 @@
 
 mod guard;
 mod principal;
+mod tangent;
 #[cfg(test)]
 mod tests;
 mod tetrahedron;
@@ -13,6 +14,7 @@ mod tetrahedron;
 use glam::{DMat3, DVec3};
 
 pub use guard::GUARD;
+pub use tangent::{Carried, Tangent};
 pub use tetrahedron::{Curvature, NODE_PAIRS, NodeBlocks, Tetrahedron};
 
 use crate::autodiff::{Mat3, Scalar};
@@ -63,6 +65,22 @@ impl Elastic {
         let stretched = Stretched::new(self, stretches);
         let stress = u * DMat3::from_diagonal(stretched.stresses()) * v.transpose();
         (stretched.energy(), stress)
+    }
+
+    /// What damping takes, J/m³, on the way from deformation gradient `before` to `f`, and its derivative at `f`, Pa. `self`
+    /// is the material times the damping's time constant over the tick, of whose energy this is the one of the change of
+    /// strain: a potential, nothing for turns, and not guarded, because whatever the change, it is resisted.
+    pub fn damping_energy_and_stress(&self, before: DMat3, f: DMat3) -> (f64, DMat3) {
+        let (change, stress) = self.damping_stress(before, f);
+        let work: f64 = (0..3).map(|i| change.columns[i].dot(stress.columns[i])).sum();
+        (0.5 * work, f * stress.value())
+    }
+
+    /// Change of strain, and the second Piola-Kirchhoff stress that it makes, Pa.
+    fn damping_stress(&self, before: DMat3, f: DMat3) -> (Mat3<f64>, Mat3<f64>) {
+        let [then, now] = [before, f].map(|f| green_strain::<f64>(&Mat3::constant(f)));
+        let change = Mat3 { columns: [0, 1, 2].map(|i| now.columns[i] - then.columns[i]) };
+        (change, self.second_stress(&change))
     }
 
     /// Second Piola-Kirchhoff stress by the strain D, Pa.

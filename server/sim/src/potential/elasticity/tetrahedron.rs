@@ -2,13 +2,9 @@
 
 use glam::{DMat3, DVec3};
 
-use super::guard::Stretched;
-use super::principal::Principal;
-use super::{Elastic, green_strain, is_safe};
-use crate::autodiff::Mat3;
+use super::{Elastic, Tangent};
 use crate::error::SimError;
 use crate::mesh::is_upright;
-use crate::potential::outer;
 
 /// Which second derivative of an energy is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,13 +64,7 @@ impl Tetrahedron {
 
     /// Second derivative of the energy with the nodes at `x`, N/m.
     pub fn stiffness(&self, material: &Elastic, x: [DVec3; 4], curvature: Curvature) -> NodeBlocks {
-        let f = self.deformation(x);
-        let strain = green_strain::<f64>(&Mat3::constant(f));
-        if curvature == Curvature::Natural && is_safe(f, strain.value()) {
-            self.unguarded_stiffness(material, f, material.second_stress(&strain).value())
-        } else {
-            self.definite_stiffness(material, f)
-        }
+        self.spread(&Tangent::of(material, self.deformation(x), curvature))
     }
 
     /// Gradients of the nodes' shape functions in rest coordinates, 1/m.
@@ -83,19 +73,15 @@ impl Tetrahedron {
         [-(b + c + d), b, c, d]
     }
 
-    /// What damping takes on the way from nodes at `before` to nodes at `x`, J, and its gradient at `x`, N: the energy of
-    /// the change of strain in `viscosity`, the material times the damping's time constant over the tick. It is a
-    /// potential of `x`, nothing for turns, and not guarded: whatever the change of strain, it is resisted.
+    /// What damping takes on the way from nodes at `before` to nodes at `x`, J, and its gradient at `x`, N; see
+    /// [`Elastic::damping_energy_and_stress`].
     pub fn damping_and_gradient(&self, viscosity: &Elastic, before: [DVec3; 4], x: [DVec3; 4]) -> (f64, [DVec3; 4]) {
-        let (f, change) = self.change_of_strain(before, x);
-        let stress = viscosity.second_stress(&change);
-        let work: f64 = (0..3).map(|i| change.columns[i].dot(stress.columns[i])).sum();
-        let (energy, stress) = (0.5 * work * self.volume, f * stress.value());
+        let (energy, stress) = viscosity.damping_energy_and_stress(self.deformation(before), self.deformation(x));
         let [b, c, d] = self.gradients.map(|g| stress * g * self.volume);
-        (energy, [-(b + c + d), b, c, d])
+        (energy * self.volume, [-(b + c + d), b, c, d])
     }
 
-    /// Second derivative of that energy, N/m.
+    /// Second derivative of that, N/m.
     pub fn damping_stiffness(
         &self,
         viscosity: &Elastic,
@@ -103,19 +89,8 @@ impl Tetrahedron {
         x: [DVec3; 4],
         curvature: Curvature,
     ) -> NodeBlocks {
-        let (f, change) = self.change_of_strain(before, x);
-        let stress = match curvature {
-            Curvature::Natural => viscosity.second_stress(&change).value(),
-            // What is left without the stress is positive semidefinite.
-            Curvature::Definite => DMat3::ZERO,
-        };
-        self.unguarded_stiffness(viscosity, f, stress)
-    }
-
-    fn change_of_strain(&self, before: [DVec3; 4], x: [DVec3; 4]) -> (DMat3, Mat3<f64>) {
-        let f = self.deformation(x);
-        let (now, then) = (green_strain(&Mat3::constant(f)), green_strain(&Mat3::constant(self.deformation(before))));
-        (f, Mat3 { columns: [0, 1, 2].map(|i| now.columns[i] - then.columns[i]) })
+        let [before, f] = [before, x].map(|x| self.deformation(x));
+        self.spread(&Tangent::of_damping(viscosity, before, f, curvature))
     }
 
     /// Deformation gradient with nodes at `x`.
@@ -126,47 +101,10 @@ impl Tetrahedron {
         DMat3::from_cols(column(f.x, g.x, h.x), column(f.y, g.y, h.y), column(f.z, g.z, h.z))
     }
 
-    /// With a, b nodes, g their gradients, S the second Piola-Kirchhoff stress and f = F g:
-    /// (gaᵀ S gb) 1 + λ fa fbᵀ + µ fb faᵀ + µ (ga·gb) F Fᵀ.
-    fn unguarded_stiffness(&self, material: &Elastic, f: DMat3, stress: DMat3) -> NodeBlocks {
-        let (lambda, mu) = (material.lambda * self.volume, material.mu * self.volume);
-        let stress = stress * self.volume;
-        let (around, carried) = (f * f.transpose() * mu, self.gradients.map(|g| f * g));
-        self.spread(|a, b| {
-            let (ga, gb) = (self.gradients[a], self.gradients[b]);
-            let (fa, fb) = (carried[a], carried[b]);
-            let material = outer(fa, fb * lambda) + outer(fb, fa * mu) + around * ga.dot(gb);
-            material + DMat3::from_diagonal(DVec3::splat(ga.dot(stress * gb)))
-        })
-    }
-
-    /// The derivative's positive part, from its eigenvectors in principal axes: three stretches, three flips, three
-    /// twists.
-    fn definite_stiffness(&self, material: &Elastic, f: DMat3) -> NodeBlocks {
-        let Principal { u, stretches, v } = Principal::of(f);
-        let stretched = Stretched::new(material, stretches);
-        let along = stretched.stretch_stiffness();
-        let shears = [(1, 2), (0, 2), (0, 1)].map(|(i, j)| stretched.shear_stiffness(i, j));
-        // What a shear of one direction does to itself and to its counterpart.
-        let [x, y, z] = shears.map(|(flip, twist)| self.volume * (flip + twist) / 2.0);
-        let crossed = shears.map(|(flip, twist)| self.volume * (flip - twist) / 2.0);
-        let own = DMat3::from_cols(DVec3::new(0.0, z, y), DVec3::new(z, 0.0, x), DVec3::new(y, x, 0.0));
-        let crossed = DMat3::from_cols(
-            DVec3::new(0.0, crossed[2], crossed[1]),
-            DVec3::new(crossed[2], 0.0, crossed[0]),
-            DVec3::new(crossed[1], crossed[0], 0.0),
-        );
-        let along = along * self.volume;
-        let gradients = self.gradients.map(|g| v.transpose() * g);
-        self.spread(|a, b| {
-            let (ga, gb) = (gradients[a], gradients[b]);
-            let block = times(along, outer(ga, gb)) + times(crossed, outer(gb, ga));
-            u * (block + DMat3::from_diagonal(own * (ga * gb))) * u.transpose()
-        })
-    }
-
     /// All blocks from those of the last three nodes: moving all four by the same changes nothing.
-    fn spread(&self, block: impl Fn(usize, usize) -> DMat3) -> NodeBlocks {
+    fn spread(&self, tangent: &Tangent) -> NodeBlocks {
+        let carried = self.gradients.map(|g| tangent.carry(g));
+        let block = |a: usize, b: usize| tangent.block(&carried[a], &carried[b]) * self.volume;
         let [bb, cb, cc] = [block(0, 0), block(1, 0), block(1, 1)];
         let [db, dc, dd] = [block(2, 0), block(2, 1), block(2, 2)];
         let ba = -(bb + cb.transpose() + db.transpose());
@@ -175,9 +113,4 @@ impl Tetrahedron {
         let aa = -(ba + ca + da);
         [aa, ba, bb, ca, cb, cc, da, db, dc, dd]
     }
-}
-
-/// Element by element.
-fn times(m: DMat3, n: DMat3) -> DMat3 {
-    DMat3::from_cols(m.x_axis * n.x_axis, m.y_axis * n.y_axis, m.z_axis * n.z_axis)
 }
