@@ -9,7 +9,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use pita_sim::{DofKind, World};
+use pita_sim::{DofKind, SliceView, World};
 use rustix::time::{ClockId, clock_gettime};
 
 /// What a run leaves behind, written while it runs.
@@ -71,25 +71,9 @@ impl Trace {
             return Err(TraceError::BodiesChanged { before, now });
         }
         for slice in world.slices() {
-            let (q, v) = (slice.q, slice.v);
-            match slice.kind {
-                DofKind::RigidBody => self.record_point(q, &[q[6], q[3], q[4], q[5]], v, &v[3..])?,
-                // Everything else whose numbers are points leaves a record for each of them.
-                DofKind::Particle | DofKind::Natural | DofKind::FiniteElements | DofKind::Lattice => {
-                    for (q, v) in q.chunks_exact(3).zip(v.chunks_exact(3)) {
-                        self.record_point(q, &[1.0, 0.0, 0.0, 0.0], v, &[0.0; 3])?;
-                    }
-                }
-                DofKind::Articulated | DofKind::Own(_) => return Err(TraceError::NoPoints { kind: slice.kind }),
+            for state in states(slice)? {
+                self.states.write(&state)?;
             }
-        }
-        Ok(())
-    }
-
-    /// Position, quaternion w x y z, velocity, angular velocity.
-    fn record_point(&mut self, q: &[f64], rotation: &[f64], v: &[f64], spin: &[f64]) -> Result<(), TraceError> {
-        for numbers in [&q[..3], rotation, &v[..3], spin] {
-            self.states.write(numbers)?;
         }
         Ok(())
     }
@@ -110,6 +94,24 @@ impl Trace {
         self.states.flush()?;
         self.times.flush()
     }
+}
+
+/// A body as a trace has it, 13 numbers a record: one for a particle or rigid body, one for each point of what is made
+/// of points. What has no rotation gets none.
+///
+/// # Errors
+/// [`TraceError::NoPoints`].
+pub fn states(slice: SliceView<'_>) -> Result<impl Iterator<Item = [f64; 13]>, TraceError> {
+    let (positions, rates) = match slice.kind {
+        DofKind::RigidBody => (7, 6),
+        DofKind::Particle | DofKind::Natural | DofKind::FiniteElements | DofKind::Lattice => (3, 3),
+        DofKind::Articulated | DofKind::Own(_) => return Err(TraceError::NoPoints { kind: slice.kind }),
+    };
+    Ok(slice.q.chunks_exact(positions).zip(slice.v.chunks_exact(rates)).map(|(q, v)| {
+        let [qx, qy, qz, qw] = q.get(3..).and_then(|q| q.try_into().ok()).unwrap_or([0.0, 0.0, 0.0, 1.0]);
+        let [wx, wy, wz] = v.get(3..).and_then(|w| w.try_into().ok()).unwrap_or([0.0; 3]);
+        [q[0], q[1], q[2], qw, qx, qy, qz, v[0], v[1], v[2], wx, wy, wz]
+    }))
 }
 
 /// What a tick took.

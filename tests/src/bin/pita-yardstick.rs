@@ -8,8 +8,10 @@ use std::str::FromStr;
 use clap::Parser;
 use pita_game::scene::Scene;
 use pita_server::trace::{self, Trace};
-use pita_sim::{Settings, SimError};
-use pita_tests::yardstick::ours::OursError;
+use pita_sim::{Settings, SimError, World};
+use pita_tests::yardstick::catalogue;
+use pita_tests::yardstick::ours::world_of_beam;
+use pita_tests::yardstick::scene::Content;
 
 #[derive(Parser)]
 #[command(name = "pita-yardstick", version = pita_protocol::build_info::VERSION_AND_COMMIT, about = "Runs a yardstick scene and writes its trace and times")]
@@ -37,25 +39,30 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), String> {
-    let settings = settings(arguments)?;
-    let name = arguments.scene.display();
-    if arguments.scene == Path::new("soft") {
-        return Err(format!("{name}: {}", OursError::NoFiniteElements));
-    }
-    let text = std::fs::read_to_string(&arguments.scene).map_err(|error| format!("{name}: {error}"))?;
-    let mut scene = Scene::parse(&text, &settings).map_err(|error| format!("{name}, {error}"))?;
+    let (mut world, ticks) = subject(&arguments.scene, &settings(arguments)?)?;
     let mut trace = Trace::create(&arguments.out).map_err(|error| error.to_string())?;
-    trace.record(&scene.world).map_err(|error| error.to_string())?;
-    for _ in 0..scene.ticks {
-        let world = &mut scene.world;
+    trace.record(&world).map_err(|error| error.to_string())?;
+    for _ in 0..ticks {
         let took = trace::time(|| {
             for _ in 0..arguments.steps {
                 world.step();
             }
         });
-        trace.record_time(took).and_then(|()| trace.record(world)).map_err(|error| error.to_string())?;
+        trace.record_time(took).and_then(|()| trace.record(&world)).map_err(|error| error.to_string())?;
     }
     trace.finish().map_err(|error| error.to_string())
+}
+
+/// The world to run, and its ticks.
+fn subject(path: &Path, settings: &Settings) -> Result<(World, usize), String> {
+    let name = path.display();
+    if let Some(Content::Beam(beam)) = path.to_str().and_then(catalogue::content) {
+        let world = world_of_beam(&beam, settings).map_err(|error| format!("{name}: {error}"))?;
+        return Ok((world, beam.ticks));
+    }
+    let text = std::fs::read_to_string(path).map_err(|error| format!("{name}: {error}"))?;
+    let scene = Scene::parse(&text, settings).map_err(|error| format!("{name}, {error}"))?;
+    Ok((scene.world, scene.ticks))
 }
 
 /// Settings of the daemon with the variant's options on top.

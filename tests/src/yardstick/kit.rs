@@ -4,15 +4,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use pita_sim::Settings;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::catalogue;
 use super::judge::judge;
 use super::ours::Ours;
 use super::rapier::{Rapier, Setting};
 use super::scene::Content;
 use super::trace::{Run, quantile, run};
+use super::{TICK_HZ, catalogue};
 
 /// Scenes that take a moment in a test build as well.
 const QUICK: &[&str] = &["pile100", "stack10", "sheep100", "chain", "cars16", "spin", "slope45", "slope55", "soft"];
@@ -118,11 +119,10 @@ fn the_judge_says_what_the_kits_says() {
     let Some(kit) = Kit::find() else { return };
     for name in QUICK {
         let content = catalogue::content(name).unwrap();
-        let mut runs = vec![("rapier", run(&mut Rapier::new(&content, Setting::DEFAULT), content.ticks(), || ()))];
-        if let Ok(mut ours) = Ours::new(&content, 1) {
-            runs.push(("pita", run(&mut ours, content.ticks(), || ())));
-        }
-        for (engine, run) in runs {
+        let mut rapier = Rapier::new(&content, Setting::DEFAULT);
+        let mut ours = Ours::new(&content, &Settings::at(TICK_HZ.recip())).unwrap();
+        let runs = [run(&mut rapier, content.ticks(), || ()), run(&mut ours, content.ticks(), || ())];
+        for (engine, run) in ["rapier", "pita"].into_iter().zip(runs) {
             compare(&format!("{name}, {engine}"), &content, &run, &kit.judge(name, &run));
         }
     }

@@ -124,7 +124,7 @@ impl Rapier {
 
     fn add_beam(&mut self, beam: &scene::Beam) {
         let half = vector(0.5 * beam.size);
-        let [nx, ny, nz] = beam.cells.map(|cells| cells + 1);
+        let [nx, ny, nz] = beam.cells.map(|cells| cells as usize + 1);
         let material = SoftBodyMaterial {
             young_modulus: beam.young_modulus as f32,
             poisson_ratio: beam.poisson_ratio as f32,

@@ -161,7 +161,7 @@ pub struct Beam {
     /// Length, height and width, m. The beam reaches from 0 to `size.x` and lies about the x axis.
     pub size: DVec3,
     /// Cells along x, y, z; there is one node more along each.
-    pub cells: [usize; 3],
+    pub cells: [u32; 3],
     /// kg/m³.
     pub density: f64,
     /// Pa.
@@ -179,7 +179,7 @@ impl RigidScene {
 
 impl Beam {
     /// Number of nodes.
-    pub fn nodes(&self) -> usize {
+    pub fn nodes(&self) -> u32 {
         self.cells.iter().map(|cells| cells + 1).product()
     }
 

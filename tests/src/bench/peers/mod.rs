@@ -10,14 +10,15 @@ mod published;
 mod report;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use pita_sim::Settings;
 
 use super::{EntryError, Options, Report};
-use crate::yardstick::catalogue;
 use crate::yardstick::judge::{Verdict, judge};
 use crate::yardstick::ours::{Ours, OursError};
 use crate::yardstick::rapier::{Rapier, Setting};
 use crate::yardstick::scene::Content;
 use crate::yardstick::trace::{self, Engine, Trouble, quantile};
+use crate::yardstick::{TICK_HZ, catalogue};
 use published::{PUBLISHED, Published};
 
 const ROUNDS: u32 = 3;
@@ -44,9 +45,10 @@ struct Outcome {
 pub fn run(options: &Options) -> Result<Report, EntryError> {
     let published = selected(&options.scenes)?;
     let (rounds, threads) = (options.rounds.unwrap_or(ROUNDS).max(1), options.threads.unwrap_or(1));
+    let settings = Settings { threads, ..Settings::at(TICK_HZ.recip()) };
     let progress = progress_bar();
     let scenes: Result<Vec<_>, _> =
-        published.into_iter().map(|published| measure(published, rounds, threads, &progress)).collect();
+        published.into_iter().map(|published| measure(published, rounds, &settings, &progress)).collect();
     progress.finish_and_clear();
     Ok(report::report(&scenes?))
 }
@@ -65,27 +67,27 @@ fn selected(names: &[String]) -> Result<Vec<&'static Published>, EntryError> {
 fn measure(
     published: &'static Published,
     rounds: u32,
-    threads: usize,
+    settings: &Settings,
     progress: &ProgressBar,
 ) -> Result<Measured, EntryError> {
     let content = catalogue::content(published.scene).ok_or_else(|| format!("no scene '{}'", published.scene))?;
     let tuned = published.rapier_accepted.map(|(setting, _)| setting).filter(|&setting| setting != Setting::DEFAULT);
-    let settings: Vec<Setting> = [Setting::DEFAULT].into_iter().chain(tuned).collect();
+    let peers: Vec<Setting> = [Setting::DEFAULT].into_iter().chain(tuned).collect();
     progress.set_prefix(published.scene);
     progress.set_position(0);
-    progress.set_length(u64::from(rounds) * content.ticks() as u64 * (1 + settings.len() as u64));
+    progress.set_length(u64::from(rounds) * content.ticks() as u64 * (1 + peers.len() as u64));
 
     let mut ours = Vec::new();
-    let mut rapier = vec![Vec::new(); settings.len()];
+    let mut rapier = vec![Vec::new(); peers.len()];
     for _ in 0..rounds {
         progress.set_message("pita");
-        ours.push(Ours::new(&content, threads).map(|engine| Outcome::of(engine, &content, progress)));
-        for (&setting, outcomes) in settings.iter().zip(&mut rapier) {
+        ours.push(Ours::new(&content, settings).map(|engine| Outcome::of(engine, &content, progress)));
+        for (&setting, outcomes) in peers.iter().zip(&mut rapier) {
             progress.set_message(format!("rapier {setting}"));
             outcomes.push(Outcome::of(Rapier::new(&content, setting), &content, progress));
         }
     }
-    let rapier = settings.into_iter().zip(rapier.into_iter().map(Outcome::best)).collect();
+    let rapier = peers.into_iter().zip(rapier.into_iter().map(Outcome::best)).collect();
     let ours = ours.into_iter().collect::<Result<Vec<_>, _>>().map(Outcome::best);
     Ok(Measured { published, content, ours, rapier })
 }

@@ -32,7 +32,7 @@ fn start(content: &Content) -> Vec<BodyState> {
         Content::Beam(beam) => (0..beam.nodes())
             .map(|node| BodyState {
                 // Along x first; where along y and z does not matter to the judge.
-                position: DVec3::new((node % (beam.cells[0] + 1)) as f64 * 0.2, 0.0, 0.0),
+                position: DVec3::new(f64::from(node % (beam.cells[0] + 1)) * 0.2, 0.0, 0.0),
                 rotation: DQuat::IDENTITY,
                 velocity: DVec3::ZERO,
                 angular_velocity: DVec3::ZERO,
