@@ -102,6 +102,35 @@ fn measurements_are_listed_and_a_wrong_name_is_refused() {
     assert!(!success && said.contains("no measurement is called 'tik'"), "{said}");
 }
 
+#[test]
+fn peers_are_run_and_judged_scene_by_scene() {
+    let Ended { success, said } =
+        run(bench().args(["peers", "--scenes", "slope45,stack10", "--rounds", "1", "--json"]));
+    assert!(success && said.contains("cheapest accepted peer"), "{said}");
+    let figures: Value = serde_json::from_str(said.lines().find(|line| line.starts_with('{')).unwrap()).unwrap();
+    for scene in ["slope45", "stack10"] {
+        let scene = &figures["figures"]["peers"][scene];
+        assert_eq!(scene["pita"]["accepted"], true, "{scene}");
+        assert_eq!(scene["rapier"][0]["accepted"], false, "at its defaults: {scene}");
+        assert_eq!(scene["rapier"][1]["accepted"], true, "at its accepted setting: {scene}");
+        assert!(scene["p50_ratio"].as_f64().unwrap() > 0.0, "{scene}");
+    }
+    let Ended { success, said } = run(bench().args(["peers", "--scenes", "slope54"]));
+    assert!(!success && said.contains("no scene 'slope54'; there are: pile100,"), "{said}");
+}
+
+#[test]
+fn the_yardsticks_beam_leaves_its_trace() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("beam");
+    let mut yardstick = Command::new(env!("CARGO_BIN_EXE_pita-yardstick"));
+    let Ended { success, said } = run(yardstick.args(["soft", "1", "default"]).arg(&out));
+    assert!(success, "{said}");
+    let size = |extension: &str| std::fs::metadata(out.with_extension(extension)).unwrap().len();
+    // 10 s of 11 by 3 by 3 nodes, of which the 3 by 3 clamped ones are no DOF.
+    assert_eq!((size("tr"), size("ms")), (301 * 90 * 13 * 8, 300 * 2 * 8));
+}
+
 fn load_test() -> Command {
     Command::new(env!("CARGO_BIN_EXE_pita-loadtest"))
 }
