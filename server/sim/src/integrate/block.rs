@@ -11,7 +11,14 @@ pub(crate) const fn zero<const D: usize>() -> Block<D> {
     [[0.0; D]; D]
 }
 
+/// Aᵀ.
+#[inline]
+pub(crate) fn transpose<const D: usize>(a: &Block<D>) -> Block<D> {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
+}
+
 /// Scalar product.
+#[inline]
 pub(crate) fn dot<const D: usize>(a: &Entry<D>, b: &Entry<D>) -> f64 {
     (0..D).map(|i| a[i] * b[i]).sum()
 }
@@ -49,10 +56,19 @@ pub(crate) fn transposed_multiply_sub<const D: usize>(a: &Block<D>, x: &Entry<D>
 }
 
 /// C −= A Bᵀ.
+#[inline]
 pub(crate) fn product_sub<const D: usize>(a: &Block<D>, b: &Block<D>, c: &mut Block<D>) {
-    for i in 0..D {
-        for j in 0..D {
-            c[i][j] -= dot(&a[i], &b[j]);
+    // Along rows of Bᵀ, so that neighbours in memory are worked on together; sums keep the order of a scalar product.
+    let b = transpose(b);
+    for (a, c) in a.iter().zip(c) {
+        let mut sums = [0.0; D];
+        for (a, b) in a.iter().zip(&b) {
+            for (sum, b) in sums.iter_mut().zip(b) {
+                *sum += a * b;
+            }
+        }
+        for (c, sum) in c.iter_mut().zip(sums) {
+            *c -= sum;
         }
     }
 }
@@ -60,23 +76,46 @@ pub(crate) fn product_sub<const D: usize>(a: &Block<D>, b: &Block<D>, c: &mut Bl
 /// Cholesky factor L of a symmetric block, A = L Lᵀ; the strict upper triangle of the result is zero.
 /// `None` where a pivot is not above `floor` times its diagonal entry.
 pub(crate) fn cholesky<const D: usize>(a: &Block<D>, floor: f64) -> Option<Block<D>> {
-    let mut l = zero();
-    for i in 0..D {
-        for j in 0..=i {
-            let (row_i, row_j): (&Entry<D>, &Entry<D>) = (&l[i], &l[j]);
-            let s = row_i[..j].iter().zip(row_j).fold(a[i][j], |s, (x, y)| s - x * y);
-            if i == j {
-                let positive = s > floor * a[i][i] && a[i][i] > 0.0;
-                if !positive {
-                    return None;
-                }
-                l[i][i] = s.sqrt();
-            } else {
-                l[i][j] = s / l[j][j];
+    // Row by row of Lᵀ, in what is left of A: neighbours in memory are worked on together.
+    let mut upper = transpose(a);
+    for j in 0..D {
+        let (done, rest) = upper.split_at_mut(j);
+        let row = &mut rest[0];
+        for above in done {
+            let factor = above[j];
+            for (x, &above) in row.iter_mut().zip(&*above) {
+                *x -= above * factor;
             }
         }
+        let pivot = row[j];
+        let positive = pivot > floor * a[j][j] && a[j][j] > 0.0;
+        if !positive {
+            return None;
+        }
+        let root = pivot.sqrt();
+        row.iter_mut().for_each(|x| *x /= root);
+        row[j] = root;
+        row[..j].fill(0.0);
     }
-    Some(l)
+    Some(transpose(&upper))
+}
+
+/// X ← X L⁻ᵀ, L lower triangular: every row of X is a right-hand side.
+#[inline]
+pub(crate) fn forward_substitute_rows<const D: usize>(l: &Block<D>, x: &mut Block<D>) {
+    // As columns, so that all right-hand sides are worked on together.
+    let mut columns = transpose(x);
+    for i in 0..D {
+        let (done, rest) = columns.split_at_mut(i);
+        let column = &mut rest[0];
+        for (&factor, known) in l[i].iter().zip(&*done) {
+            for (x, known) in column.iter_mut().zip(known) {
+                *x -= factor * known;
+            }
+        }
+        column.iter_mut().for_each(|x| *x /= l[i][i]);
+    }
+    *x = transpose(&columns);
 }
 
 /// x ← L⁻¹ x, L lower triangular.

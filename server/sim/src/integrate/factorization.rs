@@ -5,8 +5,8 @@
 //! fill, so the two are one there.
 
 use super::block::{
-    Block, Entry, backward_substitute, cholesky, forward_substitute, multiply_sub, product_sub,
-    transposed_multiply_sub, zero,
+    Block, Entry, backward_substitute, cholesky, forward_substitute, forward_substitute_rows, multiply_sub,
+    product_sub, transposed_multiply_sub, zero,
 };
 use super::matrix::Matrix;
 use super::solver::work::{block, block_product};
@@ -126,9 +126,7 @@ impl<const D: usize> Factorization<D> {
                 let mut block = given.map_or_else(zero, |k| a.lower[k]);
                 products += self.subtract_common(i, j as usize, k, &mut block);
                 // L_ij = A_ij L_jj⁻ᵀ: each row of it solves L_jj x = row.
-                for row in &mut block {
-                    forward_substitute(&self.diagonal[j as usize], row);
-                }
+                forward_substitute_rows(&self.diagonal[j as usize], &mut block);
                 product_sub(&block, &block, &mut diagonal);
                 self.lower[k] = block;
             }

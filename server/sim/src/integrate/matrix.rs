@@ -3,7 +3,7 @@
 //! Owns pattern, storage, assembly from an island's problem and the product with a vector; it knows nothing of
 //! factorisations. Stored are the diagonal and the lower triangle, row by row, columns ascending.
 
-use super::block::{Block, Entry, multiply_add, transposed_multiply_add, zero};
+use super::block::{Block, Entry, multiply_add, transpose, transposed_multiply_add, zero};
 use super::figure::{Blocks, Figures};
 use super::problem::{Problem, Unknown, Visitor, pair};
 use super::pull_back::{multiplied, projected};
@@ -11,7 +11,7 @@ use super::solver::work::block;
 use glam::DMat3;
 
 use crate::dof::{Columns, Frame};
-use crate::potential::{FIXED, FrameIndex, PairBlocks, Term};
+use crate::potential::{FIXED, FrameIndex, Term};
 
 /// Marks a term without an off-diagonal block.
 const NONE: u32 = u32::MAX;
@@ -82,11 +82,12 @@ impl<const D: usize> Matrix<D> {
     /// Adds the leading part of `factor` × `block` at (row, column), or its transpose where that is the stored half.
     fn add(&mut self, row: u32, column: u32, block: &Block<6>, factor: f64) {
         if row == column {
-            return add_scaled(&mut self.diagonal[row as usize], block, factor, false);
+            return add_scaled(&mut self.diagonal[row as usize], block, factor);
         }
         let (i, j) = (row.max(column), row.min(column));
         if let Some(slot) = slot(&self.rows, &self.columns, (i, j)) {
-            add_scaled(&mut self.lower[slot as usize], block, factor, row < column);
+            let below = if row < column { &transpose(block) } else { block };
+            add_scaled(&mut self.lower[slot as usize], below, factor);
         }
     }
 
@@ -251,40 +252,34 @@ impl<const D: usize> Visitor for Assemble<'_, D> {
         for term in terms {
             let slot = self.slots.next().copied().unwrap_or(NONE);
             let hessian = term.hessian(self.dt, pair(self.frames, term));
-            let [a, b] = term.frames();
-            if [a, b].iter().any(|&frame| frame != FIXED && frame as usize >= blocks) {
-                self.add_attached([a, b], &hessian, factor);
-                continue;
+            let frames = term.frames();
+            for (end, &frame) in frames.iter().enumerate().filter(|&(_, &frame)| frame != FIXED) {
+                let own = hessian.own(end);
+                match self.matrix.diagonal.get_mut(frame as usize) {
+                    Some(diagonal) => add_scaled(diagonal, &own, factor),
+                    // Summed up at the point and pulled back once for all terms.
+                    None => self.figures.stiffen(frame as usize - blocks, &own, factor),
+                }
             }
-            let PairBlocks { aa, ab, bb } = hessian;
-            if a != FIXED {
-                add_scaled(&mut self.matrix.diagonal[a as usize], &aa, factor, false);
-            }
-            if b != FIXED {
-                add_scaled(&mut self.matrix.diagonal[b as usize], &bb, factor, false);
-            }
+            let [a, b] = frames;
             if slot != NONE {
-                add_scaled(&mut self.matrix.lower[slot as usize], &ab, factor, a < b);
+                let ab = hessian.between();
+                let below = if a < b { transpose(&ab) } else { ab };
+                add_scaled(&mut self.matrix.lower[slot as usize], &below, factor);
+            } else if a != FIXED && b != FIXED {
+                self.pull_back([a, b], &hessian.between(), factor);
             }
         }
     }
 }
 
 impl<const D: usize> Assemble<'_, D> {
-    /// Adds a term that acts on material points of figures. What it does to one end alone is summed up there and pulled
-    /// back once for all terms; what it does between its ends is Jᵀ H J over all blocks that move them.
-    fn add_attached(&mut self, [a, b]: [FrameIndex; 2], hessian: &PairBlocks, factor: f64) {
+    /// Adds what a term does between two ends of which one is a material point of a figure: Jᵀ H J over all blocks that
+    /// move them.
+    fn pull_back(&mut self, [a, b]: [FrameIndex; 2], ab: &Block<6>, factor: f64) {
         let Self { figures, matrix, .. } = self;
         let blocks = matrix.diagonal.len();
-        for (end, block) in [(a, &hessian.aa), (b, &hessian.bb)] {
-            if (end as usize) < blocks {
-                add_scaled(&mut matrix.diagonal[end as usize], block, factor, false);
-            } else if end != FIXED {
-                figures.stiffen(end as usize - blocks, block, factor);
-            }
-        }
-        let ba = std::array::from_fn(|i| std::array::from_fn(|j| hessian.ab[j][i]));
-        for (row, column, block) in [(a, b, &hessian.ab), (b, a, &ba)] {
+        for (row, column, block) in [(a, b, ab), (b, a, &transpose(ab))] {
             movers(figures, blocks, column, |j, _, right| {
                 let half = multiplied(block, right);
                 movers(figures, blocks, row, |i, size, left| {
@@ -297,11 +292,11 @@ impl<const D: usize> Assemble<'_, D> {
     }
 }
 
-/// target += factor source, or its transpose; the leading D×D part of it.
-fn add_scaled<const D: usize>(target: &mut Block<D>, source: &Block<6>, factor: f64, transposed: bool) {
-    for i in 0..D {
-        for j in 0..D {
-            target[i][j] += factor * if transposed { source[j][i] } else { source[i][j] };
+/// target += factor source, the leading D×D part of it.
+fn add_scaled<const D: usize>(target: &mut Block<D>, source: &Block<6>, factor: f64) {
+    for (target, source) in target.iter_mut().zip(source) {
+        for (target, source) in target.iter_mut().zip(source) {
+            *target += factor * source;
         }
     }
 }

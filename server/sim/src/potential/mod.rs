@@ -152,12 +152,19 @@ impl AddAssign for Wrench {
     }
 }
 
-/// Hessian of a term with respect to the displacements of its two frames: translation first, rotation second.
+/// Hessian of a term with respect to the displacements of its two frames, as what its blocks are made of: a stiffness
+/// between two points, and stiffnesses against turns. The blocks, translation first, rotation second, are made where they
+/// are added: against the world only one of the three is wanted.
 #[derive(Clone, Debug)]
 pub(crate) struct PairBlocks {
-    pub aa: Block<6>,
-    pub ab: Block<6>,
-    pub bb: Block<6>,
+    /// N/m.
+    points: DMat3,
+    /// From the frames' origins to the points, m.
+    arms: [DVec3; 2],
+    /// Against turns of either by itself, N m.
+    turns: [DMat3; 2],
+    /// Between the turns of both, N m.
+    turns_between: DMat3,
 }
 
 /// A potential between two frames of an island.
@@ -194,50 +201,65 @@ pub(crate) fn cross_matrix(r: DVec3) -> DMat3 {
 }
 
 impl PairBlocks {
-    /// Hessian of ½ dᵀ K d, d the displacement of the point at `arm_b` of b against the one at `arm_a` of a.
+    /// Hessian of ½ dᵀ K d, K symmetric, d the displacement of the point at `arm_b` of b against the one at `arm_a` of a.
     pub fn of_points(k: DMat3, arm_a: DVec3, arm_b: DVec3) -> Self {
-        let (sa, sb) = (cross_matrix(arm_a), cross_matrix(arm_b));
-        let (ka, kb) = (k * sa, k * sb);
-        let mut blocks = Self { aa: [[0.0; 6]; 6], ab: [[0.0; 6]; 6], bb: [[0.0; 6]; 6] };
-        // J = [I, −[r]×] and K symmetric: Jᵀ K J' = [K, −K S'; S K, −S K S'].
-        place(&mut blocks.aa, k, -ka, -ka.transpose(), -(sa * ka));
-        place(&mut blocks.bb, k, -kb, -kb.transpose(), -(sb * kb));
-        place(&mut blocks.ab, -k, kb, ka.transpose(), sa * kb);
-        blocks
+        Self { points: k, arms: [arm_a, arm_b], turns: [DMat3::ZERO; 2], turns_between: DMat3::ZERO }
     }
 
     /// Adds the Hessian of ½ tᵀ K t, t the turn of b against a.
     pub fn add_rotation(&mut self, k: DMat3) {
         self.add_rotation_a(k);
         self.add_rotation_b(k);
-        add_to(&mut self.ab, 3, 3, -k);
+        self.turns_between -= k;
     }
 
     /// Adds to the rotation block of a alone.
     pub fn add_rotation_a(&mut self, k: DMat3) {
-        add_to(&mut self.aa, 3, 3, k);
+        self.turns[0] += k;
     }
 
     /// Adds to the rotation block of b alone.
     pub fn add_rotation_b(&mut self, k: DMat3) {
-        add_to(&mut self.bb, 3, 3, k);
+        self.turns[1] += k;
+    }
+
+    /// Second derivative by the displacement of one frame: 0 is a, 1 is b.
+    #[inline]
+    pub fn own(&self, end: usize) -> Block<6> {
+        // J = [I, −[r]×]: Jᵀ K J = [K, −K [r]×; [r]× K, −[r]× K [r]×].
+        let k = turned(&self.points, self.arms[end]);
+        block(self.points, -k, -k.transpose(), self.turns[end] - crossed(self.arms[end], &k))
+    }
+
+    /// Second derivative by the displacements of a, rows, and b, columns.
+    #[inline]
+    pub fn between(&self) -> Block<6> {
+        let (ka, kb) = (turned(&self.points, self.arms[0]), turned(&self.points, self.arms[1]));
+        block(-self.points, kb, ka.transpose(), self.turns_between + crossed(self.arms[0], &kb))
     }
 }
 
-fn place(block: &mut Block<6>, ll: DMat3, la: DMat3, al: DMat3, aa: DMat3) {
-    add_to(block, 0, 0, ll);
-    add_to(block, 0, 3, la);
-    add_to(block, 3, 0, al);
-    add_to(block, 3, 3, aa);
+/// K [r]×, whose columns are the images of r × the axes, negated.
+#[inline]
+fn turned(k: &DMat3, r: DVec3) -> DMat3 {
+    let [x, y, z] = [k.x_axis, k.y_axis, k.z_axis];
+    DMat3::from_cols(y * r.z - z * r.y, z * r.x - x * r.z, x * r.y - y * r.x)
 }
 
-fn add_to(block: &mut Block<6>, row: usize, column: usize, m: DMat3) {
-    for j in 0..3 {
-        let c = m.col(j).to_array();
-        for i in 0..3 {
-            block[row + i][column + j] += c[i];
-        }
-    }
+/// [r]× M.
+#[inline]
+fn crossed(r: DVec3, m: &DMat3) -> DMat3 {
+    DMat3::from_cols(r.cross(m.x_axis), r.cross(m.y_axis), r.cross(m.z_axis))
+}
+
+/// A block out of its quarters: translation by translation, translation by rotation, and so on.
+#[inline]
+fn block(ll: DMat3, la: DMat3, al: DMat3, aa: DMat3) -> Block<6> {
+    let row = |left: &DMat3, right: &DMat3, i: usize| {
+        let (l, r) = (left.to_cols_array_2d(), right.to_cols_array_2d());
+        [l[0][i], l[1][i], l[2][i], r[0][i], r[1][i], r[2][i]]
+    };
+    [row(&ll, &la, 0), row(&ll, &la, 1), row(&ll, &la, 2), row(&al, &aa, 0), row(&al, &aa, 1), row(&al, &aa, 2)]
 }
 
 /// Positive part of the geometric stiffness of a gradient `force` that acts at `arm`, with respect to turns of the body.

@@ -104,7 +104,8 @@ pub(super) fn automatic_hessian(term: &impl Term, at: &[Frame<f64>; 2], accuracy
 /// The Hessian, as written, is the automatic one, to a fraction of its largest entry.
 pub(super) fn check_hessian(term: &impl Term, at: &[Frame<f64>; 2], accuracy: f64) {
     let automatic = automatic_hessian(term, at, accuracy);
-    let PairBlocks { aa, ab, bb } = term.hessian(DT, [&at[0], &at[1]]);
+    let hessian = term.hessian(DT, [&at[0], &at[1]]);
+    let (aa, ab, bb) = (hessian.own(0), hessian.between(), hessian.own(1));
     let size = (0..12).map(|i| automatic[i][i].abs()).fold(1e-9, f64::max);
     for (i, j) in (0..12).flat_map(|i| (0..12).map(move |j| (i, j))) {
         let written = match (i / 6, j / 6) {
