@@ -94,6 +94,11 @@ pub(crate) struct ContactPoint {
 }
 
 impl ContactPoint {
+    /// Whether two points are of the same pair.
+    pub fn same_pair(&self, other: &Self) -> bool {
+        self.a == other.a && self.b == other.b
+    }
+
     /// A new point without a history between bodies that do not matter.
     #[cfg(test)]
     pub fn at(position: DVec3, normal: DVec3, gap: f64, friction: f64) -> Self {

@@ -24,28 +24,38 @@ const NAMELESS: u32 = u32::MAX;
 
 /// What is kept of a pair from tick to tick.
 struct Pair {
-    a: u32,
-    b: Partner,
     points: ArrayVec<ContactPoint, POINTS_MAX>,
     /// Parry's own memory of the pair: the last separating direction.
     parry: ContactManifold<(), ()>,
 }
 
-impl Pair {
-    fn key(&self) -> (u32, Partner) {
-        (self.a, self.b)
+/// Serial of the first body, and its partner.
+type Key = (u32, Partner);
+
+/// A pair of a tick and its place in memory, which the next tick takes over.
+#[derive(Clone, Copy)]
+struct Known {
+    key: Key,
+    place: Option<u32>,
+}
+
+impl Known {
+    fn key(&self) -> Key {
+        self.key
     }
 }
 
 /// The fine phase and its memory.
 #[derive(Default)]
 pub(super) struct NarrowPhase {
-    /// Pairs of the last tick, sorted by key.
-    last: Vec<Pair>,
-    /// Pairs of this tick, in the order in which they were asked for.
-    pairs: Vec<Pair>,
-    /// Pairs that ended; their memory is used again.
-    spare: Vec<Pair>,
+    /// What is known of pairs. They are large, and stay where they are from tick to tick.
+    memory: Vec<Pair>,
+    /// Pairs of the last tick, sorted by key; without a place where this tick has taken it over.
+    last: Vec<Known>,
+    /// Pairs of this tick, in the order in which they were asked for; sorted by key at its end.
+    pairs: Vec<Known>,
+    /// Places of pairs that ended, to be used again.
+    spare: Vec<u32>,
     manifold: Manifold,
 }
 
@@ -53,7 +63,7 @@ impl NarrowPhase {
     /// Starts a tick.
     pub fn begin(&mut self) {
         std::mem::swap(&mut self.last, &mut self.pairs);
-        self.spare.append(&mut self.pairs);
+        self.pairs.clear();
     }
 
     /// Contacts of two bodies.
@@ -61,14 +71,16 @@ impl NarrowPhase {
         let margin =
             margin((a.twist.linear - b.twist.linear).length(), reach(a, settings) + reach(b, settings), settings);
         self.manifold.clear();
-        let pair = self.take(a.serial, Partner::Body(b.serial));
+        let key = (a.serial, Partner::Body(b.serial));
+        let pair = self.take(key);
         self.parry(pair, (a.collider, a.pose), (b.collider, b.pose), margin);
-        self.update(pair, friction(a.collider, b.collider));
+        self.update(key, pair, friction(a.collider, b.collider));
     }
 
     /// Contacts of a body with a piece of static geometry.
     pub fn with_static(&mut self, a: &Moving, serial: u32, piece: &Collider, pose: Pose, settings: &Settings) {
         let margin = margin(a.twist.linear.length(), reach(a, settings), settings);
+        let key = (a.serial, Partner::Static(serial));
         self.manifold.clear();
         if let Shape::HalfSpace { normal } = piece.shape() {
             let normal = pose.rotation * *normal;
@@ -79,58 +91,61 @@ impl NarrowPhase {
             if self.manifold.reduced().is_empty() {
                 return;
             }
-            let pair = self.take(a.serial, Partner::Static(serial));
-            self.update(pair, friction(a.collider, piece));
+            let pair = self.take(key);
+            self.update(key, pair, friction(a.collider, piece));
             return;
         }
-        let pair = self.take(a.serial, Partner::Static(serial));
+        let pair = self.take(key);
         self.parry(pair, (a.collider, a.pose), (piece, pose), margin);
-        self.update(pair, friction(a.collider, piece));
+        self.update(key, pair, friction(a.collider, piece));
     }
 
     /// Ends a tick: writes all points, sorted by pair.
     pub fn finish(&mut self, contacts: &mut Vec<ContactPoint>) {
-        self.spare.append(&mut self.last);
-        self.pairs.sort_unstable_by_key(Pair::key);
-        for pair in &self.pairs {
-            contacts.extend_from_slice(&pair.points);
+        self.spare.extend(self.last.drain(..).filter_map(|known| known.place));
+        self.pairs.sort_unstable_by_key(Known::key);
+        for place in self.pairs.iter().filter_map(|known| known.place) {
+            contacts.extend_from_slice(&self.memory[place as usize].points);
         }
     }
 
     /// Takes over what the solver did to the points that [`NarrowPhase::finish`] wrote, in the same order.
     pub fn remember(&mut self, contacts: &[ContactPoint]) {
-        for (mine, theirs) in self.pairs.iter_mut().flat_map(|pair| &mut pair.points).zip(contacts) {
-            *mine = *theirs;
+        let mut contacts = contacts.iter();
+        for place in self.pairs.iter().filter_map(|known| known.place) {
+            let points = &mut self.memory[place as usize].points;
+            points.iter_mut().zip(&mut contacts).for_each(|(mine, theirs)| *mine = *theirs);
         }
     }
 
     /// Drops every pair of a body.
     pub fn forget(&mut self, serial: u32) {
-        let gone = |pair: &Pair| pair.a == serial || pair.b == Partner::Body(serial);
-        let mut i = 0;
-        while i < self.pairs.len() {
-            if gone(&self.pairs[i]) {
-                self.spare.push(self.pairs.remove(i));
-            } else {
-                i += 1;
-            }
-        }
+        let Self { pairs, spare, .. } = self;
+        pairs.retain(|Known { key: (a, b), place }| {
+            let gone = *a == serial || *b == Partner::Body(serial);
+            spare.extend(place.filter(|_| gone));
+            !gone
+        });
     }
 
-    /// Index in `pairs` of a pair, moved there from the last tick where it has been one.
-    fn take(&mut self, a: u32, b: Partner) -> usize {
-        let known = self.last.binary_search_by_key(&(a, b), Pair::key);
-        let mut pair =
-            self.spare.pop().unwrap_or_else(|| Pair { a, b, points: ArrayVec::new(), parry: ContactManifold::new() });
-        (pair.a, pair.b) = (a, b);
-        pair.points.clear();
-        pair.parry.clear();
-        if let Ok(i) = known {
-            std::mem::swap(&mut pair.points, &mut self.last[i].points);
-            std::mem::swap(&mut pair.parry, &mut self.last[i].parry);
+    /// Place in memory of a pair, with what the last tick left there where it has been one.
+    fn take(&mut self, key: Key) -> usize {
+        let known = self.last.binary_search_by_key(&key, Known::key).ok();
+        let place = known.and_then(|i| self.last[i].place.take()).unwrap_or_else(|| self.blank());
+        self.pairs.push(Known { key, place: Some(place) });
+        place as usize
+    }
+
+    /// Place in memory of a pair of which nothing is known.
+    fn blank(&mut self) -> u32 {
+        if let Some(place) = self.spare.pop() {
+            let Pair { points, parry } = &mut self.memory[place as usize];
+            points.clear();
+            parry.clear();
+            return place;
         }
-        self.pairs.push(pair);
-        self.pairs.len() - 1
+        self.memory.push(Pair { points: ArrayVec::new(), parry: ContactManifold::new() });
+        self.memory.len() as u32 - 1
     }
 
     /// Asks parry for the manifold of two convex shapes.
@@ -138,7 +153,7 @@ impl NarrowPhase {
         let (Some((shape_a, pose_a)), Some((shape_b, pose_b))) = (a.0.placed(a.1), b.0.placed(b.1)) else {
             return;
         };
-        let manifold = &mut self.pairs[pair].parry;
+        let manifold = &mut self.memory[pair].parry;
         let relative: ParryPose = pose_a.inv_mul(&pose_b);
         // Parry clones the old points to carry its own data over; we have our own, and an empty clone is free.
         manifold.points.clear();
@@ -158,8 +173,8 @@ impl NarrowPhase {
     }
 
     /// Makes contact points of the manifold's points, with the memory of those that were there last tick.
-    fn update(&mut self, pair: usize, friction: f64) {
-        let pair = &mut self.pairs[pair];
+    fn update(&mut self, (a, b): Key, pair: usize, friction: f64) {
+        let pair = &mut self.memory[pair];
         let mut old = std::mem::take(&mut pair.points);
         let single = self.manifold.reduced().len() == 1 && old.len() == 1;
         let normal = self.manifold.normal;
@@ -174,7 +189,6 @@ impl NarrowPhase {
                 (memory.anchor - normal * normal.dot(memory.anchor), memory.normal_force)
             });
             let ManifoldPoint { position, gap, feature } = *point;
-            let (a, b) = (pair.a, pair.b);
             pair.points.push(ContactPoint { a, b, position, normal, gap, friction, anchor, normal_force, feature });
         }
     }

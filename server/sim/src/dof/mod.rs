@@ -247,9 +247,14 @@ impl Node {
         if !self.rotates {
             return Pose { position, rotation: DQuat::IDENTITY };
         }
-        let spin = self.wheel_axis.map_or(DVec3::ZERO, |axis| axis * axis.dot(u.angular));
-        let turn = DQuat::from_scaled_axis(dt * (u.angular - spin - self.free_spin));
-        let turn = turn * DQuat::from_scaled_axis(dt * spin);
+        let turn = match self.wheel_axis {
+            None => DQuat::from_scaled_axis(dt * (u.angular - self.free_spin)),
+            Some(axis) => {
+                let spin = axis * axis.dot(u.angular);
+                let turn = DQuat::from_scaled_axis(dt * (u.angular - spin - self.free_spin));
+                turn * DQuat::from_scaled_axis(dt * spin)
+            }
+        };
         Pose { position, rotation: (turn * self.free_rotation).normalize() }
     }
 }

@@ -72,7 +72,7 @@ impl Integrator {
         self.islands.begin(self.active.len());
         let figures = (0..).zip(&self.active).filter(|(_, active)| scene.bodies[active.id].figure.is_some());
         figures.for_each(|(index, _)| self.islands.touch(index));
-        let contacts = scene.contacts.iter().map(|c| contact_spots(scene, c));
+        let contacts = scene.contacts.chunk_by(ContactPoint::same_pair).map(|points| contact_spots(scene, &points[0]));
         let anchors = scene.potentials.pairs().map(|[a, b]| Some([spot(scene, a)?, spot(scene, b)?]));
         for spots in contacts.chain(anchors).flatten() {
             match spots {
@@ -188,19 +188,24 @@ impl Integrator {
 
     fn gather_contacts(&mut self, scene: &Scene) {
         let Settings { dt, contact: settings, .. } = scene.settings;
-        for (source, contact) in (0u32..).zip(scene.contacts.iter()) {
-            let Some(spots) = contact_spots(scene, contact) else { continue };
+        let mut source = 0;
+        for points in scene.contacts.chunk_by(ContactPoint::same_pair) {
+            let sources = (source..).take(points.len());
+            source += points.len() as u32;
+            let Some(spots) = contact_spots(scene, &points[0]) else { continue };
             let Some((solve, ends)) = self.localise(spots, true) else { continue };
-            let frames = ends.map(|end| end.frame);
-            let arms = ends.map(|end| solve.arm(end, contact.position));
-            let closing = |speed: [DVec3; 2]| contact.normal.dot(speed[0] - speed[1]);
-            let approach = Approach {
-                now: closing([0, 1].map(|i| solve.start(ends[i]).twist().at(arms[i]))),
-                free: closing([0, 1].map(|i| solve.free_twist(ends[i]).at(arms[i]))),
-            };
-            let term = ContactTerm::new(frames, contact, arms, solve.reduced_mass(ends), approach, settings, *dt);
-            solve.problem.terms.contacts.push(term);
-            solve.contacts.push(source);
+            let (frames, mass) = (ends.map(|end| end.frame), solve.reduced_mass(ends));
+            let (origins, turns) = (ends.map(|end| solve.origin(end)), ends.map(|end| solve.turns(end)));
+            let (now, free) = (ends.map(|end| solve.start_twist(end)), ends.map(|end| solve.free_twist(end)));
+            for contact in points {
+                let arm = |i: usize| if turns[i] { contact.position - origins[i] } else { DVec3::ZERO };
+                let arms = [arm(0), arm(1)];
+                let closing = |of: [Twist; 2]| contact.normal.dot(of[0].at(arms[0]) - of[1].at(arms[1]));
+                let approach = Approach { now: closing(now), free: closing(free) };
+                let term = ContactTerm::new(frames, contact, arms, mass, approach, settings, *dt);
+                solve.problem.terms.contacts.push(term);
+            }
+            solve.contacts.extend(sources);
         }
     }
 }
@@ -243,6 +248,11 @@ impl Solve {
         attachment.map_or(Frame::WORLD, |attachment| attachment.start)
     }
 
+    /// The twist of an end at the start of the tick.
+    fn start_twist(&self, end: End) -> Twist {
+        self.node(end.frame).map_or_else(|| self.start(end).twist(), |node| node.before)
+    }
+
     /// The twist of an end at the end of the tick if nothing acts on its body but gravity.
     fn free_twist(&self, end: End) -> Twist {
         self.node(end.frame).map_or_else(|| self.start(end).twist(), |node| node.target)
@@ -280,10 +290,14 @@ impl Solve {
         ends.map(|end| self.start(end).place(end.point))
     }
 
-    /// From an end's origin to a contact point; none for what does not turn.
-    fn arm(&self, end: End, point: DVec3) -> DVec3 {
-        let turns = end.frame != FIXED && self.node(end.frame).is_none_or(|node| node.rotates);
-        if turns { point - DVec3::from(self.start(end).position) } else { DVec3::ZERO }
+    /// Where an end's frame is at the start of the tick, m.
+    fn origin(&self, end: End) -> DVec3 {
+        self.node(end.frame).map_or_else(|| self.start(end).position.into(), |node| node.start.position)
+    }
+
+    /// Whether an end's frame can turn: a force at an arm of one that cannot has no torque.
+    fn turns(&self, end: End) -> bool {
+        end.frame != FIXED && self.node(end.frame).is_none_or(|node| node.rotates)
     }
 }
 

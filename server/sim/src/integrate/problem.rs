@@ -226,6 +226,15 @@ impl Problem {
     /// Incremental potential ½ |u − u*|²_M + Φ at the candidate, J, and its gradient, the residual, in kg m/s and
     /// kg m²/s.
     pub(super) fn evaluate<const D: usize>(&mut self, residual: &mut Vec<Entry<D>>) -> f64 {
+        self.evaluate_terms(residual, false)
+    }
+
+    /// Takes what is frozen during a Newton iteration from the candidate, then as [`Problem::evaluate`], in one pass.
+    pub(super) fn relinearise_and_evaluate<const D: usize>(&mut self, residual: &mut Vec<Entry<D>>) -> f64 {
+        self.evaluate_terms(residual, true)
+    }
+
+    fn evaluate_terms<const D: usize>(&mut self, residual: &mut Vec<Entry<D>>, relinearise: bool) -> f64 {
         residual.clear();
         let mut energy = 0.0;
         for (unknown, frame) in self.unknowns.iter().zip(&self.frames) {
@@ -241,7 +250,7 @@ impl Problem {
         }
         let Self { dt, gravity, terms, figures, frames, .. } = self;
         figures.begin_gradient();
-        let mut visitor = Evaluate { dt: *dt, frames, residual, figures, energy };
+        let mut visitor = Evaluate { dt: *dt, frames, residual, figures, energy, relinearise };
         terms.visit(&mut visitor);
         energy = visitor.energy;
         energy + figures.evaluate(*dt, *gravity, frames, residual)
@@ -286,11 +295,6 @@ impl Problem {
     pub(super) fn divide_by_mass<const D: usize>(&self, p: &[Entry<D>], v: &mut Vec<Entry<D>>) {
         v.clear();
         v.extend(self.unknowns.iter().zip(p).map(|(unknown, p)| unknown.divide_by_mass(p)));
-    }
-
-    /// Takes what is frozen during a Newton iteration from the candidate.
-    pub(super) fn relinearise(&mut self) {
-        self.terms.visit(&mut Relinearise { dt: self.dt, frames: &self.frames });
     }
 
     /// Tells the potentials which step the linear model proposes.
@@ -368,12 +372,18 @@ struct Evaluate<'a, const D: usize> {
     residual: &'a mut [Entry<D>],
     figures: &'a mut Figures,
     energy: f64,
+    /// Whether what is frozen is to be taken anew first.
+    relinearise: bool,
 }
 
 impl<const D: usize> Visitor for Evaluate<'_, D> {
     fn visit<T: Term>(&mut self, terms: &mut [T]) {
         for term in terms {
-            let (energy, wrenches) = term.evaluate(self.dt, pair(self.frames, term));
+            let at = pair(self.frames, term);
+            if self.relinearise {
+                term.relinearise(self.dt, at);
+            }
+            let (energy, wrenches) = term.evaluate(self.dt, at);
             self.energy += energy;
             for (frame, wrench) in term.frames().into_iter().zip(wrenches) {
                 if let Some(entry) = self.residual.get_mut(frame as usize) {
@@ -404,19 +414,6 @@ impl Visitor for Product<'_> {
                     *tangent += wrench.tangent();
                 }
             }
-        }
-    }
-}
-
-struct Relinearise<'a> {
-    dt: f64,
-    frames: &'a [Frame<f64>],
-}
-
-impl Visitor for Relinearise<'_> {
-    fn visit<T: Term>(&mut self, terms: &mut [T]) {
-        for term in terms {
-            term.relinearise(self.dt, pair(self.frames, term));
         }
     }
 }

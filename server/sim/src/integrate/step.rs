@@ -1,6 +1,8 @@
 //! One integration of the whole world: bodies and potentials are sorted into islands, islands are solved, the answers
 //! are written to Q and Q'.
 
+use std::sync::{Mutex, PoisonError};
+
 use glam::DVec3;
 use rayon::iter::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 use slotmap::SlotMap;
@@ -14,7 +16,7 @@ use crate::dof::{Body, BodyId, Placed, Twist};
 use crate::island::Islands;
 use crate::potential::hold::{Joint, Memory};
 use crate::potential::{BallJointId, Potentials, RodId};
-use crate::settings::Settings;
+use crate::settings::{Settings, SolverSettings};
 use crate::state::State;
 
 /// Islands of fewer bodies than this in all are solved on the calling thread: waking another one costs more.
@@ -33,12 +35,17 @@ pub(crate) struct Scene<'a> {
     pub contacts: &'a mut [ContactPoint],
 }
 
-/// An island's problem with its solver and the way back to what it was made of.
+/// The solvers' memory. Nothing in it lasts longer than a solve, so islands share it: it stays in the cache.
+#[derive(Default)]
+struct Workspace {
+    rigid: Solvers<6>,
+    particles: Solvers<3>,
+}
+
+/// An island's problem and the way back to what it was made of.
 #[derive(Default)]
 pub(super) struct Solve {
     pub problem: Problem,
-    rigid: Solvers<6>,
-    particles: Solvers<3>,
     /// Share of the tick's budget, block operations.
     budget: Option<u64>,
     report: SolveReport,
@@ -62,6 +69,9 @@ pub(crate) struct Integrator {
     pub(super) active: Vec<Active>,
     pub(super) solves: Vec<Solve>,
     pool: Option<rayon::ThreadPool>,
+    /// One for the calling thread and for each of the pool.
+    workspace: Workspace,
+    pool_workspaces: Vec<Mutex<Workspace>>,
 }
 
 impl Integrator {
@@ -69,7 +79,9 @@ impl Integrator {
     pub fn new(threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("island-{i}"));
         let pool = if threads > 1 { Some(pool.build()?) } else { None };
-        Ok(Self { pool, ..Self::default() })
+        let pool_threads = pool.as_ref().map_or(0, rayon::ThreadPool::current_num_threads);
+        let pool_workspaces = std::iter::repeat_with(Mutex::default).take(pool_threads).collect();
+        Ok(Self { pool, pool_workspaces, ..Self::default() })
     }
 
     /// Integrates one tick.
@@ -109,18 +121,17 @@ impl Integrator {
         let solves = &mut self.solves[..self.islands.len()];
         share_budget(solves, settings.solver.budget);
         let solver = &settings.solver;
-        let run = |solve: &mut Solve| {
-            solve.report = if solve.problem.unknowns.iter().any(Unknown::is_wide) {
-                solve.rigid.solve(&mut solve.problem, solver, solve.budget)
-            } else {
-                solve.particles.solve(&mut solve.problem, solver, solve.budget)
-            };
-        };
         match &self.pool {
             Some(pool) if solves.len() > 1 && self.unknowns.len() >= PARALLEL_BODIES_MIN => {
+                let workspaces = &self.pool_workspaces;
+                let run = |solve: &mut Solve| {
+                    // Within the pool there is always an index, and its workspace is never asked for by another thread.
+                    let mine = &workspaces[rayon::current_thread_index().unwrap_or(0)];
+                    mine.lock().unwrap_or_else(PoisonError::into_inner).solve(solve, solver);
+                };
                 pool.install(|| solves.par_iter_mut().with_min_len(4).for_each(run));
             }
-            _ => solves.iter_mut().for_each(run),
+            _ => solves.iter_mut().for_each(|solve| self.workspace.solve(solve, solver)),
         }
     }
 
@@ -161,6 +172,17 @@ impl Integrator {
             solve.write_back(scene, &mut report);
         }
         report
+    }
+}
+
+impl Workspace {
+    fn solve(&mut self, solve: &mut Solve, settings: &SolverSettings) {
+        let Solve { problem, budget, report, .. } = solve;
+        *report = if problem.unknowns.iter().any(Unknown::is_wide) {
+            self.rigid.solve(problem, settings, *budget)
+        } else {
+            self.particles.solve(problem, settings, *budget)
+        };
     }
 }
 

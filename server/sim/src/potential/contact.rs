@@ -7,7 +7,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{FrameIndex, PairBlocks, Term, Wrench, outer};
+use super::{FIXED, FrameIndex, PairBlocks, Term, Wrench, outer};
 use crate::autodiff::{Scalar, Vec3};
 use crate::dof::Frame;
 use crate::settings::ContactSettings;
@@ -59,6 +59,7 @@ pub(crate) struct ContactTerm {
 }
 
 /// Normal force over stiffness and its integral at depth s: k (s²/w − s³/3w²) up to w, then a line.
+#[inline]
 fn normal_spline<S: Scalar>(s: S, w: f64) -> (S, S) {
     if s.below(f64::MIN_POSITIVE) {
         (S::ZERO, S::ZERO)
@@ -78,6 +79,7 @@ fn normal_slope(s: f64, w: f64) -> f64 {
 }
 
 /// Friction over its limit and its integral at slip x: x − 4/27 x³ up to 1.5, then 1.
+#[inline]
 fn friction_patch<S: Scalar>(x: S) -> (S, S) {
     if x.below(SATURATION) {
         let x2 = x * x;
@@ -131,15 +133,25 @@ impl ContactTerm {
     }
 
     /// Displacement of b against a over the tick, m.
+    #[inline]
     fn displacement<S: Scalar>(&self, dt: f64, [a, b]: [&Frame<S>; 2]) -> Vec3<S> {
-        (b.velocity_at(self.arms[1]) - a.velocity_at(self.arms[0])) * dt
+        let a = a.velocity_at(self.arms[0]);
+        if self.on_world() { -a * dt } else { (b.velocity_at(self.arms[1]) - a) * dt }
     }
 
+    /// Whether the second end is the world.
+    #[inline]
+    fn on_world(&self) -> bool {
+        self.frames[1] == FIXED
+    }
+
+    #[inline]
     fn depth<S: Scalar>(&self, displacement: Vec3<S>) -> S {
         -displacement.along(self.normal) - self.start_gap
     }
 
     /// Slip of the anchor, its length, and that length in units of limit / stiffness.
+    #[inline]
     fn slip<S: Scalar>(&self, displacement: Vec3<S>) -> (Vec3<S>, S, S) {
         let along = Vec3::constant(self.normal).scale(displacement.along(self.normal));
         let slip = Vec3::constant(self.anchor) + displacement - along;
@@ -148,6 +160,7 @@ impl ContactTerm {
     }
 
     /// Normal force, N.
+    #[inline]
     pub fn normal_force(&self, dt: f64, at: [&Frame<f64>; 2]) -> f64 {
         self.normal_stiffness * normal_spline(self.depth(self.displacement(dt, at)), self.transition).1
     }
@@ -170,6 +183,7 @@ impl Term for ContactTerm {
         self.frames
     }
 
+    #[inline]
     fn evaluate<S: Scalar>(&self, dt: f64, at: [&Frame<S>; 2]) -> (S, [Wrench<S>; 2]) {
         let displacement = self.displacement(dt, at);
         let (integral, value) = normal_spline(self.depth(displacement), self.transition);
@@ -183,7 +197,9 @@ impl Term for ContactTerm {
                 force += slip.scale(value * self.limit / length);
             }
         }
-        (energy, [Wrench::at_fixed(-force, self.arms[0]), Wrench::at_fixed(force, self.arms[1])])
+        // Nobody asks for what acts on the world.
+        let on_b = if self.on_world() { Wrench::ZERO } else { Wrench::at_fixed(force, self.arms[1]) };
+        (energy, [Wrench::at_fixed(-force, self.arms[0]), on_b])
     }
 
     fn hessian(&self, dt: f64, at: [&Frame<f64>; 2]) -> PairBlocks {
@@ -205,6 +221,7 @@ impl Term for ContactTerm {
         PairBlocks::of_points(k, self.arms[0], self.arms[1])
     }
 
+    #[inline]
     fn relinearise(&mut self, dt: f64, at: [&Frame<f64>; 2]) {
         self.limit = self.friction * self.normal_force(dt, at);
     }

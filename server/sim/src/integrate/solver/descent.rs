@@ -147,9 +147,8 @@ impl<const D: usize> Descent<D> {
 
     /// Takes anew what is frozen during an iteration, and sees how good the state is.
     fn relinearise(&mut self, problem: &mut Problem, work: &mut Work, report: &mut SolveReport) {
-        problem.relinearise();
+        report.merit = problem.relinearise_and_evaluate(&mut self.residual);
         work.told_potentials();
-        report.merit = problem.evaluate(&mut self.residual);
         work.evaluated();
         report.residual = problem.residual_speed(&self.residual);
         work.vectors(VECTORS_AN_ITERATION);
@@ -200,8 +199,7 @@ impl<const D: usize> Descent<D> {
         self.step.clear();
         self.step.extend_from_slice(step);
         problem.move_to(&self.u);
-        problem.relinearise();
-        problem.evaluate(&mut self.residual);
+        problem.relinearise_and_evaluate(&mut self.residual);
         work.told_potentials();
         work.moved_and_evaluated();
         let walk = method.walk();

@@ -114,8 +114,7 @@ impl Solvers<3> {
 fn solve(problem: &mut Problem, settings: &SolverSettings, budget: Option<u64>) -> SolveReport {
     let report = Solvers::<3>::default().solve(problem, settings, budget);
     let mut residual = Vec::<Entry<3>>::new();
-    problem.relinearise();
-    let merit = problem.evaluate(&mut residual);
+    let merit = problem.relinearise_and_evaluate(&mut residual);
     if merit.is_finite() {
         assert_eq!((merit, problem.residual_speed(&residual)), (report.merit, report.residual), "{settings:?}");
     }
