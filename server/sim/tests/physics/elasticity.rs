@@ -6,7 +6,8 @@ use pita_sim::mass::Density;
 use pita_sim::mesh::TetrahedralMesh;
 use pita_sim::potential::elasticity::Elastic;
 use pita_sim::{
-    BodyId, Collider, DQuat, DVec3, DofKind, FigureDesc, FiniteElements, PartCollider, Settings, Shape, World,
+    Anchor, BallJointDesc, BodyId, Collider, DQuat, DVec3, DofKind, FigureDesc, FiniteElements, PartCollider,
+    RigidBodyDesc, Settings, Shape, World,
 };
 
 use super::{DT, ground, precise, weightless, world};
@@ -226,17 +227,67 @@ fn bad_bodies_are_refused_by_name() {
     assert!(world.add_figure(stray).unwrap_err().to_string().contains("part of a collider is 5"));
 }
 
-/// What blows up is put where it was, counted, and the rest goes on.
+/// What blows up is put where it last was sane, counted, and the rest goes on.
 #[test]
 fn a_jelly_that_overflows_is_quarantined() {
     let mut world = weightless();
     let mut wild = desc(jelly(1e11), DVec3::ZERO);
     scattered(&mut wild.v, 9e8);
-    let (wild, calm) = (world.add_figure(wild).unwrap(), world.add_figure(desc(jelly(1e5), DVec3::X * 10.0)).unwrap());
-    for _ in 0..3 {
-        world.step();
+    let mut calm = desc(jelly(1e5), DVec3::X * 10.0);
+    calm.v.fill(0.1);
+    let (wild, calm) = (world.add_figure(wild).unwrap(), world.add_figure(calm).unwrap());
+    let counted: usize = (0..60).map(|_| world.step().quarantined).sum();
+    assert_eq!((counted, world.is_quarantined(wild), world.is_quarantined(calm)), (1, true, false));
+    assert!(world.slice(wild).unwrap().q.iter().all(|x| x.abs() < 1e9));
+    let drifted = world.slice(calm).unwrap().q[0] - 9.5;
+    assert!((drifted - 0.2).abs() < 1e-3, "{drifted}");
+}
+
+/// Thrown at a wall it is squeezed to where its stiffness alone is indefinite, and every tick is solved all the same.
+#[test]
+fn a_slammed_jelly_is_solved() {
+    let mut world = world();
+    ground(&mut world);
+    let body = jelly(2e5);
+    let collider = || Collider::new(Shape::Ball { radius: 0.05 }, 0.5);
+    let colliders =
+        (0..36).map(|node| PartCollider { at: body.at_node(node).unwrap(), collider: collider() }).collect();
+    let mut thrown = FigureDesc { colliders, ..desc(body, DVec3::Y) };
+    thrown.v.chunks_exact_mut(3).for_each(|v| v[1] = -20.0);
+    world.add_figure(thrown).unwrap();
+    let mut iterations = 0;
+    for tick in 0..60 {
+        let report = world.step();
+        assert_eq!(report.unconverged_islands, 0, "tick {tick}: {report:?}");
+        assert!(report.worst_penetration < 0.05, "{report:?}");
+        iterations += report.iterations;
     }
-    assert!(!world.is_quarantined(calm));
-    let sane = world.slice(wild).unwrap().q.iter().all(|x| x.abs() < 1e9);
-    assert!(sane);
+    assert!(iterations < 240, "{iterations}");
+}
+
+/// A rigid body on a joint in its corner: one island of points and of what turns.
+#[test]
+fn a_jelly_and_a_rigid_body_on_a_joint_keep_their_momentum() {
+    let mut world = precise(DVec3::ZERO);
+    let body = jelly(1e5);
+    let corner = body.at_node(0).unwrap();
+    let id = world.add_figure(desc(body, DVec3::ZERO)).unwrap();
+    let half = DVec3::new(0.2, 0.1, 0.1);
+    let at = corner.point - DVec3::X * half.x;
+    let velocity = DVec3::new(0.5, 2.0, -1.0);
+    let inertia = DVec3::new(0.3, 0.6, 0.6);
+    let rigid = world.add_rigid_body(RigidBodyDesc { velocity, ..RigidBodyDesc::new(at, 30.0, inertia) }).unwrap();
+    let anchors = (Anchor::part(id, corner.part, corner.point), Anchor::body(rigid, DVec3::X * half.x));
+    world.add_ball_joint(BallJointDesc::new(anchors.0, anchors.1)).unwrap();
+    let before = world.momentum().linear;
+    let mut energy = world.energy().total();
+    for _ in 0..90 {
+        let report = world.step();
+        assert!(report.worst_joint_gap < 1.2e-3, "{report:?}");
+        let now = world.energy().total();
+        assert!(now < energy + 1e-3, "{energy} {now}");
+        energy = now;
+    }
+    assert!((world.momentum().linear - before).length() < 1e-4, "{}", world.momentum().linear);
+    assert!(DVec3::from(world.frame(id, corner).unwrap().linear).length() > 0.05);
 }
