@@ -67,6 +67,13 @@ pub(crate) fn require_vector(vector: glam::DVec3, what: &'static str) -> Result<
     require(largest < LARGEST, what, value, "finite and below 1e9")
 }
 
+/// `Err` unless the vector is finite and has a direction.
+pub(crate) fn require_direction(vector: glam::DVec3, what: &'static str) -> Result<(), SimError> {
+    require_vector(vector, what)?;
+    let length = vector.length();
+    require(length > 1e-6, what, length, "a vector longer than 1e-6")
+}
+
 /// `Err` unless the quaternion is finite and of unit length within 1e-3.
 pub(crate) fn require_rotation(rotation: glam::DQuat, what: &'static str) -> Result<(), SimError> {
     let length = rotation.length();

@@ -43,8 +43,9 @@ pub use error::SimError;
 pub use glam::{DMat3, DQuat, DVec3};
 pub use integrate::{Method, Preconditioner, StepReport, StoppedBecause};
 pub use potential::{
-    Anchor, AxleControl, AxleDesc, AxleId, BallJointDesc, BallJointId, Motor, PdControl, PdDesc, PdId, RodDesc, RodId,
-    SpringDesc, SpringId,
+    Anchor, AngleLimitDesc, AngleLimitId, AxleControl, AxleDesc, AxleId, BallJointDesc, BallJointId, DistanceLimitDesc,
+    DistanceLimitId, Driven, FixedJointDesc, FixedJointId, HingeDesc, HingeId, Motor, MotorDesc, MotorId, PdControl,
+    PdDesc, PdId, RodDesc, RodId, SliderDesc, SliderId, SpringDesc, SpringId,
 };
 pub use settings::{ContactSettings, Settings, SolverSettings};
 pub use world::{Energy, Momentum, SliceView, World};

@@ -1,6 +1,6 @@
 //! Material points of figures at which something acts: frames of an island beside those of its blocks.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::figure::Figure;
 use crate::dof::{Columns, Frame, PartPoint, Twist};
@@ -16,6 +16,8 @@ pub(crate) struct Attachment {
     pub start: Frame<f64>,
     /// What resists a force here, kg.
     pub mass: f64,
+    /// What a torque turns here, mean over axes, 1/(kg m²).
+    pub inverse_inertia: f64,
 }
 
 /// How a block moves an attachment's frame.
@@ -51,4 +53,9 @@ impl Attachment {
         }
         Frame { linear: twist.linear.into(), angular: twist.angular.into(), ..self.start }
     }
+}
+
+/// Sum of the diagonal.
+pub(super) fn trace(m: DMat3) -> f64 {
+    m.x_axis.x + m.y_axis.y + m.z_axis.z
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::attachment::{Attachment, Influence};
+use super::attachment::{Attachment, Influence, trace};
 use super::block::{Block, Entry, zero};
 use super::pull_back::{add_block, inertia_block, multiplied, projected};
 use crate::dof::{Dof, FigureBody, Frame, Inertia, LocalState, PartInertia, PartLoad, PartPoint, PointMasses, Twist};
@@ -137,8 +137,9 @@ impl Figures {
         });
         let range = (first, influences.len() as u32);
         let start = owner.dof.frame(at, &owner.q0, &owner.v0);
-        let mass = owner.mass_at(at, &influences[first as usize..]);
-        self.attachments.push(Attachment { figure, at, frozen, influences: range, start, mass });
+        let movers = &influences[first as usize..];
+        let (mass, inverse_inertia) = (owner.mass_at(at, movers), owner.inverse_inertia_at(at, movers));
+        self.attachments.push(Attachment { figure, at, frozen, influences: range, start, mass, inverse_inertia });
         self.attachments.len() as u32 - 1
     }
 
@@ -330,6 +331,19 @@ impl Figure {
                 influences.iter().map(inverse).sum::<f64>().recip()
             }
         }
+    }
+
+    /// What a torque turns at a material point, mean over axes, 1/(kg m²).
+    fn inverse_inertia_at(&self, at: PartPoint, influences: &[Influence]) -> f64 {
+        let trace = match self.dof.inertia() {
+            Inertia::Parts(parts) => trace(parts[at.part as usize].inertia.inverse()),
+            Inertia::Points(masses) => {
+                let squared = |column: &[f64; 6]| DVec3::from_slice(&column[3..]).length_squared();
+                let turn = |i: &Influence| i.columns.iter().map(squared).sum::<f64>();
+                influences.iter().map(|i| turn(i) / masses.diagonal[i.own_block as usize]).sum()
+            }
+        };
+        trace / 3.0
     }
 
     fn local_state(&self, dt: f64, definite: bool) -> LocalState<'_> {

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::attachment::trace;
 use super::problem::{Rates, Unknown};
 use super::step::{Integrator, Scene, Solve};
 use crate::collide::{ContactPoint, Partner};
@@ -114,7 +115,7 @@ impl Integrator {
     }
 
     /// As [`Integrator::localise`], for two anchors.
-    fn localise_anchors(&mut self, scene: &Scene, anchors: [Anchor; 2]) -> Option<(&mut Solve, [End; 2])> {
+    pub(super) fn localise_anchors(&mut self, scene: &Scene, anchors: [Anchor; 2]) -> Option<(&mut Solve, [End; 2])> {
         let spots = [spot(scene, anchors[0])?, spot(scene, anchors[1])?];
         let (solve, mut ends) = self.localise(spots, false)?;
         for (end, anchor) in ends.iter_mut().zip(anchors) {
@@ -136,7 +137,7 @@ impl Integrator {
         for (id, &Held { desc, memory }) in &scene.potentials.rods {
             let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
             let scale = solve.scale(ends, solve.places(ends), solver.joint_stiffness);
-            solve.problem.terms.rods.push(RodTerm::new(ends, desc.length, desc.tolerance, scale, memory));
+            solve.problem.terms.rods.push(RodTerm::new(ends, [desc.length; 2], desc.tolerance, scale, memory));
             solve.rods.push(id);
         }
         self.gather_own_rods(scene);
@@ -146,6 +147,7 @@ impl Integrator {
             solve.problem.terms.ball_joints.push(BallJointTerm::new(ends, desc.tolerance, scale, memory));
             solve.ball_joints.push(id);
         }
+        self.gather_joints(scene);
         for desc in scene.potentials.axles.values() {
             let anchors = [desc.chassis, desc.wheel].map(|id| Anchor::body(id, DVec3::ZERO));
             let Some((solve, ends)) = self.localise_anchors(scene, anchors) else { continue };
@@ -180,7 +182,7 @@ impl Integrator {
                 let ends = frames.map(|frame| End { frame, point: DVec3::ZERO });
                 let points = rod.points.map(|point| DVec3::from_slice(&q[3 * point as usize..]));
                 let scale = solve.scale(ends, points, scene.settings.solver.joint_stiffness);
-                solve.problem.terms.own_rods.push(RodTerm::new(ends, rod.length, rod.tolerance, scale, memory));
+                solve.problem.terms.own_rods.push(RodTerm::new(ends, [rod.length; 2], rod.tolerance, scale, memory));
                 solve.own_rods.push((active.id, index));
             }
         }
@@ -239,7 +241,7 @@ impl Solve {
     }
 
     /// The frame of an end at the start of the tick.
-    fn start(&self, end: End) -> Frame<f64> {
+    pub(super) fn start(&self, end: End) -> Frame<f64> {
         if let Some(node) = self.node(end.frame) {
             return node.start_frame();
         }
@@ -278,15 +280,38 @@ impl Solve {
     }
 
     /// What the stiffness of a joint between two ends is measured with; its points are at `places`.
-    fn scale(&self, ends: [End; 2], places: [DVec3; 2], least: f64) -> Scale {
+    pub(super) fn scale(&self, ends: [End; 2], places: [DVec3; 2], least: f64) -> Scale {
         let dt = self.problem.dt;
         let reach = places[0].abs().max(places[1].abs()).max_element();
         let (unit, strongest) = (self.reduced_mass(ends) / (dt * dt), self.mass * STRONGEST / (dt * dt));
         Scale { unit, least, reach, strongest }
     }
 
+    /// What turns at an end under a torque, mean over axes, 1/(kg m²); 0 for what does not turn.
+    fn inverse_inertia(&self, end: End) -> f64 {
+        match self.problem.unknowns.get(end.frame as usize) {
+            Some(Unknown::Body(node)) if node.rotates => trace(node.inverse_inertia) / 3.0,
+            Some(_) => 0.0,
+            None => {
+                let attachment = (end.frame as usize).checked_sub(self.problem.len());
+                let attachment = attachment.and_then(|k| self.problem.figures.attachments.get(k));
+                attachment.map_or(0.0, |attachment| attachment.inverse_inertia)
+            }
+        }
+    }
+
+    /// What the stiffness of a joint against turns of two ends is measured with.
+    pub(super) fn turn_scale(&self, ends: [End; 2], least: f64) -> Scale {
+        let dt = self.problem.dt;
+        let inverse: f64 = ends.iter().map(|&end| self.inverse_inertia(end)).sum();
+        let unit = if inverse > 0.0 { (inverse * dt * dt).recip() } else { 0.0 };
+        // Forces that the island can bring to bear act at levers of a metre, or of the ends' own arms.
+        let lever = ends.iter().map(|end| end.point.length()).fold(1.0, f64::max);
+        Scale { unit, least, reach: 0.0, strongest: self.mass * STRONGEST / (dt * dt) * lever }
+    }
+
     /// World positions of two ends at the start of the tick, m.
-    fn places(&self, ends: [End; 2]) -> [DVec3; 2] {
+    pub(super) fn places(&self, ends: [End; 2]) -> [DVec3; 2] {
         ends.map(|end| self.start(end).place(end.point))
     }
 

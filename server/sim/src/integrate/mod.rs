@@ -10,6 +10,7 @@ mod conjugate_gradient;
 mod factorization;
 pub(crate) mod figure;
 mod gather;
+mod gather_joints;
 mod line_search;
 mod matrix;
 mod preconditioner;
@@ -53,7 +54,9 @@ pub struct StepReport {
     pub worst_penetration: f64,
     /// Widest gap of any joint at the end of the tick, m.
     pub worst_joint_gap: f64,
-    /// Joints and rods whose gap is above their tolerance at the end of the tick: overloaded beyond what stiffness can
+    /// Widest turn that any joint or angle limit should not leave, at the end of the tick, rad.
+    pub worst_joint_tilt: f64,
+    /// Joints, rods and limits whose gap or tilt is above their tolerance at the end of the tick: overloaded beyond what stiffness can
     /// hold, torn by an impact, or lengths that cannot agree.
     pub open_joints: usize,
     /// Bodies that were quarantined in this tick because their state became non-finite.

@@ -9,8 +9,13 @@ use crate::dof::{BLOCK_RATES_MAX, Frame, Node, Twist};
 use crate::potential::axle::AxleTerm;
 use crate::potential::ball_joint::BallJointTerm;
 use crate::potential::contact::ContactTerm;
+use crate::potential::fixed_joint::FixedJointTerm;
+use crate::potential::hinge::HingeTerm;
+use crate::potential::limit::AngleLimitTerm;
+use crate::potential::motor::MotorTerm;
 use crate::potential::pd::PdTerm;
 use crate::potential::rod::RodTerm;
+use crate::potential::slider::SliderTerm;
 use crate::potential::spring::SpringTerm;
 use crate::potential::{FIXED, FrameIndex, Term, Wrench};
 
@@ -45,6 +50,12 @@ terms! {
     rods: RodTerm,
     own_rods: RodTerm,
     ball_joints: BallJointTerm,
+    hinges: HingeTerm,
+    fixed_joints: FixedJointTerm,
+    sliders: SliderTerm,
+    distance_limits: RodTerm,
+    angle_limits: AngleLimitTerm,
+    motors: MotorTerm,
     axles: AxleTerm,
     pds: PdTerm,
 }

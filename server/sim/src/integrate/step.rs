@@ -15,7 +15,9 @@ use crate::collide::ContactPoint;
 use crate::dof::{Body, BodyId, Placed, Twist};
 use crate::island::Islands;
 use crate::potential::hold::{Joint, Memory};
-use crate::potential::{BallJointId, Potentials, RodId};
+use crate::potential::{
+    AngleLimitId, BallJointId, DistanceLimitId, FixedJointId, HingeId, Potentials, RodId, SliderId,
+};
 use crate::settings::{Settings, SolverSettings};
 use crate::state::State;
 
@@ -57,6 +59,11 @@ pub(super) struct Solve {
     /// Body and index of each rod of a figure.
     pub own_rods: Vec<(BodyId, u32)>,
     pub ball_joints: Vec<BallJointId>,
+    pub hinges: Vec<HingeId>,
+    pub fixed_joints: Vec<FixedJointId>,
+    pub sliders: Vec<SliderId>,
+    pub distance_limits: Vec<DistanceLimitId>,
+    pub angle_limits: Vec<AngleLimitId>,
 }
 
 /// The integrator with its memory.
@@ -195,6 +202,11 @@ impl Solve {
         self.rods.clear();
         self.own_rods.clear();
         self.ball_joints.clear();
+        self.hinges.clear();
+        self.fixed_joints.clear();
+        self.sliders.clear();
+        self.distance_limits.clear();
+        self.angle_limits.clear();
     }
 
     /// Hands back what potentials remember, and looks how well they hold.
@@ -212,6 +224,21 @@ impl Solve {
         }
         for (term, &id) in problem.terms.ball_joints.iter().zip(&self.ball_joints) {
             potentials.ball_joints[id].memory = account(problem, term, report);
+        }
+        for (term, &id) in problem.terms.hinges.iter().zip(&self.hinges) {
+            potentials.hinges[id].memory = account(problem, term, report);
+        }
+        for (term, &id) in problem.terms.fixed_joints.iter().zip(&self.fixed_joints) {
+            potentials.fixed_joints[id].memory = account(problem, term, report);
+        }
+        for (term, &id) in problem.terms.sliders.iter().zip(&self.sliders) {
+            potentials.sliders[id].memory = account(problem, term, report);
+        }
+        for (term, &id) in problem.terms.distance_limits.iter().zip(&self.distance_limits) {
+            potentials.distance_limits[id].memory = account(problem, term, report);
+        }
+        for (term, &id) in problem.terms.angle_limits.iter().zip(&self.angle_limits) {
+            potentials.angle_limits[id].memory = account(problem, term, report);
         }
         for (term, &(body, rod)) in problem.terms.own_rods.iter().zip(&self.own_rods) {
             let figure = scene.bodies[body].figure.as_mut();
@@ -252,6 +279,7 @@ fn share_budget(solves: &mut [Solve], budget: Option<u64>) {
 fn account(problem: &Problem, joint: &impl Joint, report: &mut StepReport) -> Memory {
     let at = problem.pair(joint);
     report.worst_joint_gap = report.worst_joint_gap.max(joint.gap(at));
+    report.worst_joint_tilt = report.worst_joint_tilt.max(joint.tilt(at));
     report.open_joints += usize::from(joint.is_open(at));
     let memory = joint.remember(at);
     Memory { force: finite_or_zero(memory.force), ..memory }

@@ -44,10 +44,10 @@ pub struct AxleControl {
     pub brake: f64,
 }
 
-/// A motor: torque clamp(gain (target − spin), ±max_torque) about the wheel's z axis.
+/// A motor: torque clamp(gain (target − spin), ±max_torque) about the wheel's z axis, or a hinge's.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motor {
-    /// Spin against the chassis, rad/s; driving towards +x is negative.
+    /// Spin against the chassis (a hinge's first end), rad/s; a wheel that drives towards +x spins negatively.
     pub target_speed: f64,
     /// N m s/rad.
     pub gain: f64,
@@ -61,19 +61,7 @@ const BRAKE_GAIN: f64 = 1e4;
 impl AxleControl {
     pub(crate) fn validate(&self) -> Result<(), SimError> {
         require(self.steer.abs() < std::f64::consts::FRAC_PI_2, "steer", self.steer, "-90 to 90 degrees")?;
-        require(
-            self.drive.target_speed.abs() < 1e9,
-            "drive.target_speed",
-            self.drive.target_speed,
-            "within 1e9 rad/s",
-        )?;
-        require((0.0..1e15).contains(&self.drive.gain), "drive.gain", self.drive.gain, "0 to below 1e15 N m s/rad")?;
-        require(
-            (0.0..1e9).contains(&self.drive.max_torque),
-            "drive.max_torque",
-            self.drive.max_torque,
-            "0 to below 1e9 N m",
-        )?;
+        self.drive.validate().map_err(|reason| reason.of("drive"))?;
         require((0.0..1e9).contains(&self.brake), "brake", self.brake, "0 to below 1e9 N m")
     }
 }

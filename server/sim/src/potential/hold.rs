@@ -125,6 +125,11 @@ pub(crate) trait Joint: Term {
     /// Widest gap at the candidate, m.
     fn gap(&self, at: [&Frame<f64>; 2]) -> f64;
 
+    /// Turn at the candidate that should not be, rad.
+    fn tilt(&self, _at: [&Frame<f64>; 2]) -> f64 {
+        0.0
+    }
+
     /// Whether a gap is above the tolerance.
     fn is_open(&self, at: [&Frame<f64>; 2]) -> bool;
 

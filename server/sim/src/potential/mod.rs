@@ -4,13 +4,19 @@
 //! kinds of DOF move them, at a candidate state and answers energy, gradient and a positive semidefinite Hessian with respect to displacements:
 //! translations in m, rotations as small world-axis turns in rad. Gradients are minus the force and torque, N and N m.
 
+pub(crate) mod alignment;
 pub(crate) mod axle;
 pub(crate) mod ball_joint;
 pub(crate) mod contact;
 pub mod elasticity;
+pub(crate) mod fixed_joint;
+pub(crate) mod hinge;
 pub(crate) mod hold;
+pub(crate) mod limit;
+pub(crate) mod motor;
 pub(crate) mod pd;
 pub(crate) mod rod;
+pub(crate) mod slider;
 pub(crate) mod spring;
 #[cfg(test)]
 mod tests;
@@ -20,12 +26,18 @@ use std::ops::AddAssign;
 use glam::{DMat3, DVec3};
 use slotmap::SlotMap;
 
+use alignment::Captured;
 pub use axle::{AxleControl, AxleDesc, AxleId, Motor};
 pub use ball_joint::{BallJointDesc, BallJointId};
+pub use fixed_joint::{FixedJointDesc, FixedJointId};
+pub use hinge::{HingeDesc, HingeId};
 use hold::Held;
+pub use limit::{AngleLimitDesc, AngleLimitId, DistanceLimitDesc, DistanceLimitId};
+pub use motor::{Driven, MotorDesc, MotorId};
 pub(crate) use pd::PdGains;
 pub use pd::{PdControl, PdDesc, PdId};
 pub use rod::{RodDesc, RodId};
+pub use slider::{SliderDesc, SliderId};
 pub use spring::{SpringDesc, SpringId};
 
 use crate::autodiff::{Dual, Scalar, Vec3};
@@ -66,20 +78,32 @@ pub(crate) struct Potentials {
     pub springs: SlotMap<SpringId, SpringDesc>,
     pub rods: SlotMap<RodId, Held<RodDesc>>,
     pub ball_joints: SlotMap<BallJointId, Held<BallJointDesc>>,
+    /// With the axis and the direction of angle 0.
+    pub hinges: SlotMap<HingeId, Held<Captured<HingeDesc, 2>>>,
+    pub fixed_joints: SlotMap<FixedJointId, Held<Captured<FixedJointDesc, 3>>>,
+    pub sliders: SlotMap<SliderId, Held<Captured<SliderDesc, 3>>>,
+    pub distance_limits: SlotMap<DistanceLimitId, Held<DistanceLimitDesc>>,
+    pub angle_limits: SlotMap<AngleLimitId, Held<AngleLimitDesc>>,
+    pub motors: SlotMap<MotorId, MotorDesc>,
     pub axles: SlotMap<AxleId, AxleDesc>,
     pub pds: SlotMap<PdId, (PdDesc, PdGains)>,
 }
 
 impl Potentials {
-    /// Both ends of every potential.
+    /// Both ends of every potential; angle limits and motors share those of their joint.
     pub fn pairs(&self) -> impl Iterator<Item = [Anchor; 2]> + '_ {
         let centre = |body: BodyId| Anchor::body(body, DVec3::ZERO);
         let springs = self.springs.values().map(|s| [s.a, s.b]);
         let rods = self.rods.values().map(|r| [r.desc.a, r.desc.b]);
         let ball_joints = self.ball_joints.values().map(|j| [j.desc.a, j.desc.b]);
+        let hinges = self.hinges.values().map(|h| [h.desc.desc.a, h.desc.desc.b]);
+        let fixed_joints = self.fixed_joints.values().map(|j| [j.desc.desc.a, j.desc.desc.b]);
+        let sliders = self.sliders.values().map(|s| [s.desc.desc.a, s.desc.desc.b]);
+        let limits = self.distance_limits.values().map(|l| [l.desc.a, l.desc.b]);
         let axles = self.axles.values().map(move |a| [centre(a.chassis), centre(a.wheel)]);
         let pds = self.pds.values().map(move |(pd, _)| [centre(pd.body), Anchor::world(DVec3::ZERO)]);
-        springs.chain(rods).chain(ball_joints).chain(axles).chain(pds)
+        let joints = ball_joints.chain(hinges).chain(fixed_joints).chain(sliders);
+        springs.chain(rods).chain(joints).chain(limits).chain(axles).chain(pds)
     }
 
     /// Removes every potential of a body.
@@ -88,8 +112,23 @@ impl Potentials {
         self.springs.retain(|_, s| stays([s.a.body, s.b.body]));
         self.rods.retain(|_, r| stays([r.desc.a.body, r.desc.b.body]));
         self.ball_joints.retain(|_, j| stays([j.desc.a.body, j.desc.b.body]));
+        self.hinges.retain(|_, h| stays([h.desc.desc.a.body, h.desc.desc.b.body]));
+        self.fixed_joints.retain(|_, j| stays([j.desc.desc.a.body, j.desc.desc.b.body]));
+        self.sliders.retain(|_, s| stays([s.desc.desc.a.body, s.desc.desc.b.body]));
+        self.distance_limits.retain(|_, l| stays([l.desc.a.body, l.desc.b.body]));
+        self.remove_orphans();
         self.axles.retain(|_, a| stays([Some(a.chassis), Some(a.wheel)]));
         self.pds.retain(|_, (pd, _)| pd.body != body);
+    }
+
+    /// Removes what drives or limits a joint that is gone.
+    pub fn remove_orphans(&mut self) {
+        let Self { hinges, sliders, angle_limits, motors, .. } = self;
+        angle_limits.retain(|_, limit| hinges.contains_key(limit.desc.hinge));
+        motors.retain(|_, motor| match motor.joint {
+            Driven::Hinge(hinge) => hinges.contains_key(hinge),
+            Driven::Slider(slider) => sliders.contains_key(slider),
+        });
     }
 }
 

@@ -3,12 +3,16 @@
 use glam::DQuat;
 use proptest::prelude::*;
 
+use super::alignment::{Aligned, Alignment};
 use super::axle::AxleTerm;
 use super::ball_joint::BallJointTerm;
 use super::contact::{Approach, ContactTerm};
 use super::hold::{Memory, Scale};
+use super::limit::AngleLimitTerm;
+use super::motor::MotorTerm;
 use super::pd::PdTerm;
 use super::rod::RodTerm;
+use super::slider::LineTerm;
 use super::spring::SpringTerm;
 use super::*;
 use crate::autodiff::Dual;
@@ -126,6 +130,10 @@ pub(super) fn vector() -> impl Strategy<Value = DVec3> {
     prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from_array)
 }
 
+pub(super) fn direction() -> impl Strategy<Value = DVec3> {
+    vector().prop_filter("too short", |v| v.length() > 0.1).prop_map(DVec3::normalize)
+}
+
 pub(super) fn frame() -> impl Strategy<Value = Frame<f64>> {
     (vector(), vector(), vector(), vector()).prop_map(|(position, turn, linear, angular)| {
         let rotation = DMat3::from_quat(DQuat::from_scaled_axis(turn * 2.0));
@@ -184,9 +192,9 @@ proptest! {
     }
 
     #[test]
-    fn rod_derives(a in vector(), b in vector(), length in 0.1..3.0, t in frame(), u in frame()) {
+    fn rod_derives(a in vector(), b in vector(), length in 0.1..3.0f64, t in frame(), u in frame()) {
         prop_assume!((t.place(a) - u.place(b)).length() > 0.1);
-        let term = RodTerm::new(ends(a, b), length, 1e-3, SCALE, Memory::default());
+        let term = RodTerm::new(ends(a, b), [length; 2], 1e-3, SCALE, Memory::default());
         check_gradient(&term, &[t, u]);
         automatic_hessian(&term, &[t, u], 1e-5);
     }
@@ -195,7 +203,7 @@ proptest! {
     fn rod_of_the_right_length_has_the_exact_hessian(a in vector(), b in vector(), t in frame(), u in frame()) {
         let length = (t.place(a) - u.place(b)).length();
         prop_assume!(length > 0.1);
-        let mut term = RodTerm::new(ends(a, b), length, 1e-3, SCALE, Memory::default());
+        let mut term = RodTerm::new(ends(a, b), [length; 2], 1e-3, SCALE, Memory::default());
         term.relinearise(DT, [&t, &u]);
         check_hessian(&term, &[t, u], 1e-5);
     }
@@ -204,7 +212,7 @@ proptest! {
     fn stretched_rod_between_points_has_the_exact_hessian(length in 0.1..0.9, t in frame(), u in frame()) {
         let distance = DVec3::from(t.position - u.position).length();
         prop_assume!(distance > 0.1);
-        let mut term = RodTerm::new(ends(DVec3::ZERO, DVec3::ZERO), distance * length, 1e-3, SCALE, Memory::default());
+        let mut term = RodTerm::new(ends(DVec3::ZERO, DVec3::ZERO), [distance * length; 2], 1e-3, SCALE, Memory::default());
         term.relinearise(DT, [&t, &u]);
         term.propose([Twist::REST; 2]);
         check_hessian(&term, &[t, u], 1e-5);
@@ -223,6 +231,89 @@ proptest! {
         let mut term = BallJointTerm::new(ends(a, b), 1e-3, SCALE, Memory::default());
         term.relinearise(DT, [&t, &u]);
         check_hessian(&term, &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn rope_derives_taut_and_slack(a in vector(), b in vector(), length in 0.1..3.0f64, t in frame(), u in frame()) {
+        let distance = (t.place(a) - u.place(b)).length();
+        prop_assume!(distance > 0.1 && (distance - length).abs() > 1e-4);
+        let mut term = RodTerm::new(ends(a, b), [0.0, length], 1e-3, SCALE, Memory::default());
+        term.relinearise(DT, [&t, &u]);
+        check_gradient(&term, &[t, u]);
+        automatic_hessian(&term, &[t, u], 1e-5);
+        prop_assert_eq!(term.evaluate(DT, [&t, &u]).0 > 0.0, distance > length);
+        if distance < length {
+            check_hessian(&term, &[t, u], 1e-9);
+        }
+    }
+
+    #[test]
+    fn hinge_and_fixed_joint_derive(a in vector(), b in vector(), axes in prop::array::uniform6(direction()), t in frame(), u in frame()) {
+        let place = BallJointTerm::new(ends(a, b), 1e-3, SCALE, Memory::default());
+        let [p, q, r, s, v, w] = axes;
+        let hinge = Aligned { place: place.clone(), turns: Alignment::new([[p, q]], 1e-3, SCALE, Memory::default()) };
+        check_gradient(&hinge, &[t, u]);
+        automatic_hessian(&hinge, &[t, u], 1e-5);
+        let turns = Alignment::new([[p, q], [r, s], [v, w]], 1e-3, SCALE, Memory::default());
+        let fixed = Aligned { place, turns };
+        check_gradient(&fixed, &[t, u]);
+        automatic_hessian(&fixed, &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn closed_joints_have_the_exact_hessian(a in vector(), b in vector(), axis in direction(), t in frame(), mut u in frame()) {
+        u.position = t.position + t.arm(a) - u.arm(b);
+        let both = |axis: DVec3| [axis, u.rotation.transposed_multiply(t.arm(axis)).into()];
+        let place = BallJointTerm::new(ends(a, b), 1e-3, SCALE, Memory::default());
+        let turns = Alignment::new([both(axis)], 1e-3, SCALE, Memory::default());
+        let mut hinge = Aligned { place: place.clone(), turns };
+        hinge.relinearise(DT, [&t, &u]);
+        check_hessian(&hinge, &[t, u], 1e-5);
+        let turns = Alignment::new(DVec3::AXES.map(both), 1e-3, SCALE, Memory::default());
+        let mut fixed = Aligned { place, turns };
+        fixed.relinearise(DT, [&t, &u]);
+        check_hessian(&fixed, &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn line_derives(a in vector(), b in vector(), axis in direction(), t in frame(), u in frame()) {
+        let term = LineTerm::new(ends(a, b), axis, 1e-3, SCALE, Memory::default());
+        check_gradient(&term, &[t, u]);
+        automatic_hessian(&term, &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn point_on_its_line_has_the_exact_hessian(a in vector(), b in vector(), axis in direction(), along in -3.0..3.0, t in frame(), mut u in frame()) {
+        u.position = t.position + t.arm(a + axis * along) - u.arm(b);
+        let mut term = LineTerm::new(ends(a, b), axis, 1e-3, SCALE, Memory::default());
+        term.relinearise(DT, [&t, &u]);
+        check_hessian(&term, &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn angle_limit_derives(axis in direction(), lower in -3.0..3.0f64, range in 0.0..3.0f64, t in frame(), u in frame()) {
+        let (zero, _) = axis.any_orthonormal_pair();
+        let desc = AngleLimitDesc::new(HingeId::default(), lower, lower + range);
+        let term = AngleLimitTerm::new([0, 1], [[axis; 2], [zero; 2]], &desc, SCALE, Memory::default());
+        // Neither at the kinks (a bound, the far side) nor where the axes are so far apart that there is no angle.
+        let angle = limit::hinge_angle([[axis; 2], [zero; 2]], [&t, &u]);
+        let off = (angle - lower - range / 2.0).sin_cos();
+        let off = off.0.atan2(off.1).abs();
+        prop_assume!((off - range / 2.0).abs() > 1e-3 && off < 3.1);
+        prop_assume!(t.arm(axis).cross(u.arm(zero)).length() > 0.3);
+        check_gradient(&term, &[t, u]);
+        automatic_hessian(&term, &[t, u], 1e-4);
+    }
+
+    #[test]
+    fn motor_derives(axis in direction(), target in -3.0..3.0, limit in 1.0..100.0, a in vector(), b in vector(), t in frame(), u in frame()) {
+        let motor = Motor { target_speed: target, gain: 60.0, max_torque: limit };
+        for term in [MotorTerm::turning([0, 1], motor, axis), MotorTerm::sliding([0, 1], motor, axis, [a, b])] {
+            check_gradient(&term, &[t, u]);
+        }
+        let motor = Motor { max_torque: 1e6, ..motor };
+        check_hessian(&MotorTerm::turning([0, 1], motor, axis), &[t, u], 1e-5);
+        check_hessian(&MotorTerm::sliding([0, 1], motor, axis, [a, b]), &[t, u], 1e-5);
     }
 
     #[test]

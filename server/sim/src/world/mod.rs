@@ -1,6 +1,7 @@
 //! The world: bodies, potentials and static geometry under generational handles, and the two stages of the pipeline that
 //! are the engine's.
 
+mod joints;
 mod potentials;
 
 use glam::{DQuat, DVec3};

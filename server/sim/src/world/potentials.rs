@@ -39,9 +39,7 @@ impl World {
     pub fn add_ball_joint(&mut self, desc: BallJointDesc) -> Result<BallJointId, SimError> {
         desc.validate()?;
         self.check_anchors(desc.a, desc.b)?;
-        if let (Some(a), Some(b)) = (desc.a.body, desc.b.body) {
-            self.detector.exclude(self.bodies[a].serial, self.bodies[b].serial);
-        }
+        self.exclude(desc.a, desc.b);
         Ok(self.potentials.ball_joints.insert(Held::new(desc)))
     }
 
@@ -90,9 +88,7 @@ impl World {
     /// Removes a ball joint. Answers whether there was one.
     pub fn remove_ball_joint(&mut self, id: BallJointId) -> bool {
         let Some(joint) = self.potentials.ball_joints.remove(id) else { return false };
-        if let (Some(a), Some(b)) = (joint.desc.a.body, joint.desc.b.body) {
-            self.detector.include(self.bodies[a].serial, self.bodies[b].serial);
-        }
+        self.include(joint.desc.a, joint.desc.b);
         true
     }
 
@@ -126,7 +122,21 @@ impl World {
         Ok(())
     }
 
-    fn check_anchors(&self, a: Anchor, b: Anchor) -> Result<(), SimError> {
+    /// From now on the bodies of a joint do not collide with each other.
+    pub(super) fn exclude(&mut self, a: Anchor, b: Anchor) {
+        if let (Some(a), Some(b)) = (a.body, b.body) {
+            self.detector.exclude(self.bodies[a].serial, self.bodies[b].serial);
+        }
+    }
+
+    /// Takes one [`World::exclude`] back.
+    pub(super) fn include(&mut self, a: Anchor, b: Anchor) {
+        if let (Some(a), Some(b)) = (a.body, b.body) {
+            self.detector.include(self.bodies[a].serial, self.bodies[b].serial);
+        }
+    }
+
+    pub(super) fn check_anchors(&self, a: Anchor, b: Anchor) -> Result<(), SimError> {
         for anchor in [a, b] {
             let Some(id) = anchor.body else { continue };
             let body = self.bodies.get(id).ok_or(SimError::Gone { what: "a body of the potential" })?;

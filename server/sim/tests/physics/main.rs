@@ -10,6 +10,7 @@ mod joints;
 mod lattice;
 mod natural;
 mod own_kind;
+mod potentials;
 mod sheep;
 mod sheep_forms;
 mod solvers;

@@ -1,0 +1,91 @@
+//! Gathering of joints that hold turns, and of what limits and drives them.
+
+use glam::DVec3;
+
+use super::step::{Integrator, Scene};
+use crate::potential::alignment::{Aligned, Alignment, Captured};
+use crate::potential::ball_joint::BallJointTerm;
+use crate::potential::hold::Held;
+use crate::potential::limit::AngleLimitTerm;
+use crate::potential::motor::MotorTerm;
+use crate::potential::rod::RodTerm;
+use crate::potential::slider::LineTerm;
+use crate::potential::{Driven, MotorDesc};
+
+impl Integrator {
+    pub(super) fn gather_joints(&mut self, scene: &Scene) {
+        let least = scene.settings.solver.joint_stiffness;
+        for (id, &Held { desc: Captured { desc, axes: [axis, _] }, memory }) in &scene.potentials.hinges {
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let scale = solve.scale(ends, solve.places(ends), least);
+            let place = BallJointTerm::new(ends, desc.tolerance, scale, memory);
+            let turns = Alignment::new([axis], desc.tilt, solve.turn_scale(ends, least), memory);
+            solve.problem.terms.hinges.push(Aligned { place, turns });
+            solve.hinges.push(id);
+        }
+        for (id, &Held { desc: Captured { desc, axes }, memory }) in &scene.potentials.fixed_joints {
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let scale = solve.scale(ends, solve.places(ends), least);
+            let place = BallJointTerm::new(ends, desc.tolerance, scale, memory);
+            let turns = Alignment::new(axes, desc.tilt, solve.turn_scale(ends, least), memory);
+            solve.problem.terms.fixed_joints.push(Aligned { place, turns });
+            solve.fixed_joints.push(id);
+        }
+        for (id, &Held { desc: Captured { desc, axes }, memory }) in &scene.potentials.sliders {
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let scale = solve.scale(ends, solve.places(ends), least);
+            let place = LineTerm::new(ends, axes[0][0], desc.tolerance, scale, memory);
+            let turns = Alignment::new(axes, desc.tilt, solve.turn_scale(ends, least), memory);
+            solve.problem.terms.sliders.push(Aligned { place, turns });
+            solve.sliders.push(id);
+        }
+        self.gather_limits(scene);
+        self.gather_motors(scene);
+    }
+
+    fn gather_limits(&mut self, scene: &Scene) {
+        let least = scene.settings.solver.joint_stiffness;
+        for (id, &Held { desc, memory }) in &scene.potentials.distance_limits {
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let scale = solve.scale(ends, solve.places(ends), least);
+            let term = RodTerm::new(ends, [desc.at_least, desc.at_most], desc.tolerance, scale, memory);
+            solve.problem.terms.distance_limits.push(term);
+            solve.distance_limits.push(id);
+        }
+        for (id, &Held { desc, memory }) in &scene.potentials.angle_limits {
+            let Captured { desc: hinge, axes } = scene.potentials.hinges[desc.hinge].desc;
+            let Some((solve, ends)) = self.localise_anchors(scene, [hinge.a, hinge.b]) else { continue };
+            let frames = ends.map(|end| end.frame);
+            let term = AngleLimitTerm::new(frames, axes, &desc, solve.turn_scale(ends, least), memory);
+            solve.problem.terms.angle_limits.push(term);
+            solve.angle_limits.push(id);
+        }
+    }
+
+    fn gather_motors(&mut self, scene: &Scene) {
+        for &MotorDesc { joint, motor } in scene.potentials.motors.values() {
+            let (anchors, axis) = match joint {
+                Driven::Hinge(id) => {
+                    let Captured { desc, axes } = scene.potentials.hinges[id].desc;
+                    ([desc.a, desc.b], axes[0][0])
+                }
+                Driven::Slider(id) => {
+                    let Captured { desc, axes } = scene.potentials.sliders[id].desc;
+                    ([desc.a, desc.b], axes[0][0])
+                }
+            };
+            let Some((solve, ends)) = self.localise_anchors(scene, anchors) else { continue };
+            let (frames, starts) = (ends.map(|end| end.frame), ends.map(|end| solve.start(end)));
+            let axis = starts[0].arm(axis).into();
+            let term = match joint {
+                Driven::Hinge(_) => MotorTerm::turning(frames, motor, axis),
+                Driven::Slider(_) => {
+                    let driven = starts[1].place(ends[1].point);
+                    let arms = starts.map(|start| driven - DVec3::from(start.position));
+                    MotorTerm::sliding(frames, motor, axis, arms)
+                }
+            };
+            solve.problem.terms.motors.push(term);
+        }
+    }
+}
