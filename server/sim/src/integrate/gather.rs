@@ -162,10 +162,10 @@ impl Integrator {
             solve.problem.terms.axles.push(term);
         }
         for (desc, gains) in scene.potentials.pds.values() {
-            let anchors = [Anchor::body(desc.body, DVec3::ZERO), Anchor::world(DVec3::ZERO)];
+            let anchors = [desc.at, Anchor::world(DVec3::ZERO)];
             let Some((solve, [end, _])) = self.localise_anchors(scene, anchors) else { continue };
-            let (mass, position) = (solve.mass(end), solve.start(end).position.into());
-            solve.problem.terms.pds.push(PdTerm::new(end.frame, desc, *gains, mass, position, *dt));
+            let (mass, start) = (solve.mass(end), solve.start(end).place(end.point));
+            solve.problem.terms.pds.push(PdTerm::new(end, desc, *gains, mass, start, *dt));
         }
     }
 

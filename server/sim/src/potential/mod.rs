@@ -101,7 +101,7 @@ impl Potentials {
         let sliders = self.sliders.values().map(|s| [s.desc.desc.a, s.desc.desc.b]);
         let limits = self.distance_limits.values().map(|l| [l.desc.a, l.desc.b]);
         let axles = self.axles.values().map(move |a| [centre(a.chassis), centre(a.wheel)]);
-        let pds = self.pds.values().map(move |(pd, _)| [centre(pd.body), Anchor::world(DVec3::ZERO)]);
+        let pds = self.pds.values().map(|(pd, _)| [pd.at, Anchor::world(DVec3::ZERO)]);
         let joints = ball_joints.chain(hinges).chain(fixed_joints).chain(sliders);
         springs.chain(rods).chain(joints).chain(limits).chain(axles).chain(pds)
     }
@@ -118,7 +118,7 @@ impl Potentials {
         self.distance_limits.retain(|_, l| stays([l.desc.a.body, l.desc.b.body]));
         self.remove_orphans();
         self.axles.retain(|_, a| stays([Some(a.chassis), Some(a.wheel)]));
-        self.pds.retain(|_, (pd, _)| pd.body != body);
+        self.pds.retain(|_, (pd, _)| pd.at.body != Some(body));
     }
 
     /// Removes what drives or limits a joint that is gone.

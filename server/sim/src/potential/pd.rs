@@ -3,9 +3,10 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{FIXED, FrameIndex, PairBlocks, Term, Wrench};
+use super::{Anchor, End, FIXED, FrameIndex, PairBlocks, Term, Wrench, geometric_stiffness};
 use crate::autodiff::{Scalar, Vec3};
-use crate::dof::{BodyId, Frame};
+use crate::dof::Frame;
+use crate::dof::articulated::JointDrive;
 use crate::error::{SimError, require, require_vector};
 
 slotmap::new_key_type! {
@@ -13,15 +14,14 @@ slotmap::new_key_type! {
     pub struct PdId;
 }
 
-/// A PD controller on a body's centre of mass, to be added.
+/// A PD controller on a point of a body of any kind, to be added.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PdDesc {
-    /// What it moves.
-    pub body: BodyId,
-    /// Hz, as seen by a player.
-    pub frequency: f64,
-    /// 1 is critical, as seen by a player.
-    pub damping_ratio: f64,
+    /// What it moves. Gains are made for the mass of the whole body or part (of an elastic body, for what a force at the
+    /// point feels), so away from a centre of mass the point is quicker than asked for.
+    pub at: Anchor,
+    /// Second order, or first order (talk, "Velocity Potential": F = (Vt − V) Kd), which does not mind the position.
+    pub drive: JointDrive,
     /// Largest force, N; infinite for none.
     pub max_force: f64,
     /// Where to; may be changed at any tick.
@@ -80,11 +80,13 @@ impl PdGains {
 
 /// A PD controller in an island.
 ///
-/// Both gains act on the velocity at the end of the tick, so the force is `slope` (v_goal − v): a bowl around the
-/// velocity that would be right, with a constant slope where the force is at its limit.
+/// Both gains act on the velocity with which the point gets to where it is at the end of the tick, so the force is `slope`
+/// (v_goal − v): a bowl around the place that would be right, with a constant slope where the force is at its limit.
 #[derive(Clone, Debug)]
 pub(crate) struct PdTerm {
-    frame: FrameIndex,
+    end: End,
+    /// The point at the start of the tick, m.
+    start: DVec3,
     /// Ks dt + Kd, N s/m.
     slope: f64,
     goal: DVec3,
@@ -92,36 +94,43 @@ pub(crate) struct PdTerm {
 }
 
 impl PdTerm {
-    pub fn new(frame: FrameIndex, desc: &PdDesc, gains: PdGains, mass: f64, position: DVec3, dt: f64) -> Self {
+    /// `gains` are per kg of `mass`; the point is at `start`.
+    pub fn new(end: End, desc: &PdDesc, gains: PdGains, mass: f64, start: DVec3, dt: f64) -> Self {
         let slope = gains.stiffness * dt + gains.damping;
         let PdControl { target, target_velocity } = desc.control;
-        let goal = ((target - position) * gains.stiffness + target_velocity * gains.damping) / slope.max(1e-300);
-        Self { frame, slope: slope * mass, goal, max_force: desc.max_force }
+        let goal = ((target - start) * gains.stiffness + target_velocity * gains.damping) / slope.max(1e-300);
+        Self { end, start, slope: slope * mass, goal, max_force: desc.max_force }
     }
 
-    /// Force without the limit, and the factor that the limit leaves of it.
-    fn force<S: Scalar>(&self, body: &Frame<S>) -> (Vec3<S>, S) {
-        let force = (Vec3::constant(self.goal) - body.linear) * self.slope;
+    /// Arm of the point, force without the limit, and the factor that the limit leaves of it.
+    fn force<S: Scalar>(&self, dt: f64, body: &Frame<S>) -> (Vec3<S>, Vec3<S>, S) {
+        let arm = body.arm(self.end.point);
+        let velocity = (body.position + arm - Vec3::constant(self.start)) * dt.recip();
+        let force = (Vec3::constant(self.goal) - velocity) * self.slope;
         let size = force.length();
-        (force, if size.below(self.max_force) { S::ONE } else { S::from(self.max_force) / size })
+        (arm, force, if size.below(self.max_force) { S::ONE } else { S::from(self.max_force) / size })
     }
 }
 
 impl Term for PdTerm {
     fn frames(&self) -> [FrameIndex; 2] {
-        [self.frame, FIXED]
+        [self.end.frame, FIXED]
     }
 
     fn evaluate<S: Scalar>(&self, dt: f64, [body, _]: [&Frame<S>; 2]) -> (S, [Wrench<S>; 2]) {
-        let (force, left) = self.force(body);
+        let (arm, force, left) = self.force(dt, body);
         // Huber's function of the velocity error, over one tick.
         let energy = left * (-left / 2.0 + 1.0) * force.dot(force) * (dt / self.slope.max(1e-300));
-        (energy, [Wrench::at_fixed(-force.scale(left), DVec3::ZERO), Wrench::ZERO])
+        (energy, [Wrench::at(-force.scale(left), arm), Wrench::ZERO])
     }
 
     fn hessian(&self, dt: f64, [body, _]: [&Frame<f64>; 2]) -> PairBlocks {
-        let (_, left) = self.force(body);
-        PairBlocks::of_points(DMat3::from_diagonal(DVec3::splat(self.slope * left / dt)), DVec3::ZERO, DVec3::ZERO)
+        let (arm, force, left) = self.force(dt, body);
+        let (arm, force) = (DVec3::from(arm), DVec3::from(force) * left);
+        let stiffness = DMat3::from_diagonal(DVec3::splat(self.slope * left / dt));
+        let mut blocks = PairBlocks::of_points(stiffness, arm, DVec3::ZERO);
+        blocks.add_rotation_a(geometric_stiffness(-force, arm));
+        blocks
     }
 }
 

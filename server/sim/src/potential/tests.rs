@@ -17,6 +17,7 @@ use super::spring::SpringTerm;
 use super::*;
 use crate::autodiff::Dual;
 use crate::collide::ContactPoint;
+use crate::dof::articulated::JointDrive;
 use crate::dof::{Node, Pose};
 use crate::settings::ContactSettings;
 
@@ -345,10 +346,14 @@ proptest! {
     }
 
     #[test]
-    fn pd_controller_derives(target in vector(), max_force in 1.0..1e4, t in frame()) {
+    fn pd_controller_derives(target in vector(), point in vector(), max_force in 1.0..1e4, t in frame()) {
         let control = PdControl { target, target_velocity: DVec3::X };
-        let desc = PdDesc { body: BodyId::default(), frequency: 1.0, damping_ratio: 1.0, max_force, control };
-        let term = PdTerm::new(0, &desc, PdGains::new(1.0, 1.0, DT).unwrap(), 5.0, t.position.into(), DT);
+        let drive = JointDrive::Position { frequency: 1.0, damping_ratio: 1.0 };
+        let at = Anchor::body(BodyId::default(), point);
+        let desc = PdDesc { at, drive, max_force, control };
+        let end = End { frame: 0, point };
+        let start = t.place(point) + target * 0.1;
+        let term = PdTerm::new(end, &desc, drive.gains(DT).unwrap(), 5.0, start, DT);
         check_gradient(&term, &[t, Frame::WORLD]);
     }
 

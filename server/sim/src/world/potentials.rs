@@ -4,11 +4,11 @@ use glam::DVec3;
 
 use super::World;
 use crate::dof::DofKind;
-use crate::error::{SimError, require};
+use crate::error::{SimError, require, require_vector};
 use crate::potential::hold::Held;
 use crate::potential::{
-    Anchor, AxleControl, AxleDesc, AxleId, BallJointDesc, BallJointId, PdControl, PdDesc, PdGains, PdId, RodDesc,
-    RodId, SpringDesc, SpringId,
+    Anchor, AxleControl, AxleDesc, AxleId, BallJointDesc, BallJointId, PdControl, PdDesc, PdId, RodDesc, RodId,
+    SpringDesc, SpringId,
 };
 
 impl World {
@@ -68,10 +68,12 @@ impl World {
         if !positive {
             return Err(SimError::OutOfRange { what: "max_force", value: desc.max_force, allowed: "above 0 N" });
         }
-        let gains = PdGains::new(desc.frequency, desc.damping_ratio, self.settings.dt)?;
-        if !self.bodies.contains_key(desc.body) {
-            return Err(SimError::Gone { what: "the body of the controller" });
+        require_vector(desc.at.point, "at.point")?;
+        let gains = desc.drive.gains(self.settings.dt)?;
+        if desc.at.body.is_none() {
+            return Err(SimError::Unusable { what: "a controller needs a body to move" });
         }
+        self.check_anchors(desc.at, Anchor::world(DVec3::ZERO))?;
         Ok(self.potentials.pds.insert((desc, gains)))
     }
 

@@ -1,6 +1,6 @@
 //! What implicit Euler gives in closed form.
 
-use pita_sim::{Anchor, DQuat, DVec3, PdControl, PdDesc, RigidBodyDesc, SpringDesc};
+use pita_sim::{Anchor, DQuat, DVec3, JointDrive, PdControl, PdDesc, RigidBodyDesc, SpringDesc};
 
 use super::{DT, cube, particle, weightless, world};
 
@@ -99,7 +99,8 @@ fn pd_controllers_reach_their_target() {
         let mut world = world();
         let body = cube(&mut world, DVec3::new(0.0, 0.0, 1.0));
         let control = PdControl { target: DVec3::ZERO, target_velocity: DVec3::ZERO };
-        let pd = PdDesc { body, frequency, damping_ratio, max_force: f64::INFINITY, control };
+        let drive = JointDrive::Position { frequency, damping_ratio };
+        let pd = PdDesc { at: Anchor::body(body, DVec3::ZERO), drive, max_force: f64::INFINITY, control };
         world.add_pd(pd).unwrap();
         for _ in 0..ticks {
             world.step();

@@ -27,8 +27,8 @@ pub struct JointMotor {
     pub max_force: f64,
 }
 
-/// How a motor follows its targets, as a player sees it: the engine finds the gains for its tick and for the inertia
-/// that the joint feels, joints with motors being held and those without being loose.
+/// How a motor or a PD controller follows its targets, as a player sees it: the engine finds the gains for its tick and
+/// for the inertia that it feels; at a joint, the others with motors being held and those without being loose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointDrive {
     /// Swings to the target like a damped spring.
@@ -113,7 +113,7 @@ impl JointDrive {
     ///
     /// # Errors
     /// What this tick cannot show.
-    fn gains(self, dt: f64) -> Result<PdGains, SimError> {
+    pub(crate) fn gains(self, dt: f64) -> Result<PdGains, SimError> {
         match self {
             Self::Position { frequency, damping_ratio } => PdGains::new(frequency, damping_ratio, dt),
             Self::Velocity { time_constant } => {
