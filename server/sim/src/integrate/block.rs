@@ -79,12 +79,11 @@ pub(crate) fn cholesky<const D: usize>(a: &Block<D>, floor: f64) -> Option<Block
     // Row by row of Lᵀ, in what is left of A: neighbours in memory are worked on together.
     let mut upper = transpose(a);
     for j in 0..D {
-        let (done, rest) = upper.split_at_mut(j);
-        let row = &mut rest[0];
-        for above in done {
+        let mut row = upper[j];
+        for above in &upper[..j] {
             let factor = above[j];
-            for (x, &above) in row.iter_mut().zip(&*above) {
-                *x -= above * factor;
+            for i in 0..D {
+                row[i] -= above[i] * factor;
             }
         }
         let pivot = row[j];
@@ -93,9 +92,10 @@ pub(crate) fn cholesky<const D: usize>(a: &Block<D>, floor: f64) -> Option<Block
             return None;
         }
         let root = pivot.sqrt();
-        row.iter_mut().for_each(|x| *x /= root);
-        row[j] = root;
-        row[..j].fill(0.0);
+        for i in 0..D {
+            upper[j][i] = if i < j { 0.0 } else { row[i] / root };
+        }
+        upper[j][j] = root;
     }
     Some(transpose(&upper))
 }
@@ -105,15 +105,15 @@ pub(crate) fn cholesky<const D: usize>(a: &Block<D>, floor: f64) -> Option<Block
 pub(crate) fn forward_substitute_rows<const D: usize>(l: &Block<D>, x: &mut Block<D>) {
     // As columns, so that all right-hand sides are worked on together.
     let mut columns = transpose(x);
-    for i in 0..D {
+    for (i, row) in l.iter().enumerate() {
         let (done, rest) = columns.split_at_mut(i);
         let column = &mut rest[0];
-        for (&factor, known) in l[i].iter().zip(&*done) {
+        for (&factor, known) in row.iter().zip(&*done) {
             for (x, known) in column.iter_mut().zip(known) {
                 *x -= factor * known;
             }
         }
-        column.iter_mut().for_each(|x| *x /= l[i][i]);
+        column.iter_mut().for_each(|x| *x /= row[i]);
     }
     *x = transpose(&columns);
 }

@@ -22,8 +22,6 @@ use crate::settings::Settings;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Active {
     pub id: BodyId,
-    /// Its first block among all unknowns.
-    pub first: u32,
     /// Its first block in its island; [`ABSENT`] where nothing acts on it.
     pub start: u32,
     /// Its index among the figures of its island; [`ABSENT`] for particles and rigid bodies.
@@ -40,8 +38,6 @@ enum Spot {
 
 impl Integrator {
     pub(super) fn gather_bodies(&mut self, scene: &mut Scene) {
-        let Settings { dt, gravity, .. } = *scene.settings;
-        self.unknowns.clear();
         self.active.clear();
         for body in scene.bodies.values_mut() {
             body.is_wheel = false;
@@ -53,19 +49,12 @@ impl Integrator {
         for &id in scene.order {
             let body = &mut scene.bodies[id];
             body.index = if body.quarantined { ABSENT } else { self.active.len() as u32 };
-            if !body.quarantined {
-                let first = self.unknowns.len() as u32;
-                self.active.push(Active { id, first, start: ABSENT, figure: ABSENT });
-                match &body.figure {
-                    None => self.unknowns.push(Unknown::Body(body.node(scene.state, dt, gravity))),
-                    Some(figure) => {
-                        let v = scene.state.v(body.slice);
-                        self.unknowns.extend(rates(figure, v, dt * gravity).map(Unknown::Rates));
-                    }
-                }
+            if body.quarantined {
+                // Forces are for one tick, whether the body takes part in it or not.
+                (body.force, body.torque) = Default::default();
+            } else {
+                self.active.push(Active { id, start: ABSENT, figure: ABSENT });
             }
-            // Forces are for one tick, whether the body takes part in it or not.
-            (body.force, body.torque) = Default::default();
         }
     }
 
@@ -88,7 +77,7 @@ impl Integrator {
             solve.clear(scene.settings);
             for &member in self.islands.members(island) {
                 let active = &mut self.active[member as usize];
-                solve.take_in(active, &self.unknowns, scene);
+                solve.take_in(active, scene);
             }
         }
     }
@@ -214,26 +203,28 @@ impl Integrator {
 
 impl Solve {
     /// Takes a body into the island, with its share of all `unknowns`.
-    fn take_in(&mut self, active: &mut Active, unknowns: &[Unknown], scene: &Scene) {
+    fn take_in(&mut self, active: &mut Active, scene: &Scene) {
+        let Settings { dt, gravity, .. } = *scene.settings;
         let body = &scene.bodies[active.id];
         let start = self.problem.unknowns.len();
         active.start = start as u32;
         self.mass += body.mass;
-        let unknowns = &unknowns[active.first as usize..];
-        let Some(figure) = &body.figure else { return self.problem.unknowns.push(unknowns[0]) };
-        self.problem.unknowns.extend_from_slice(&unknowns[..figure.ranks.len()]);
-        for (&rank, &unknown) in figure.ranks.iter().zip(unknowns) {
-            self.problem.unknowns[start + rank as usize] = unknown;
-        }
-        let Settings { dt, gravity, .. } = *scene.settings;
+        let unknowns = &mut self.problem.unknowns;
+        let Some(figure) = &body.figure else {
+            return unknowns.push(Unknown::Body(body.node(scene.state, dt, gravity)));
+        };
         let state = [scene.state.q(body.slice), scene.state.v(body.slice)];
+        unknowns.resize(start + figure.ranks.len(), Unknown::Rates(Rates::default()));
+        for (&rank, rates) in figure.ranks.iter().zip(rates(figure, state[1], dt * gravity)) {
+            unknowns[start + rank as usize] = Unknown::Rates(rates);
+        }
         let blocks = figure.ranks.iter().map(|rank| active.start + rank);
         active.figure = self.problem.figures.add(figure, blocks, state, dt);
         self.problem.figures.attach_parts(active.figure, dt, gravity);
     }
 
     /// The particle or rigid body of a frame.
-    fn node(&self, frame: u32) -> Option<&Node> {
+    pub(super) fn node(&self, frame: u32) -> Option<&Node> {
         match self.problem.unknowns.get(frame as usize) {
             Some(Unknown::Body(node)) => Some(node),
             _ => None,

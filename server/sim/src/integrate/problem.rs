@@ -70,7 +70,7 @@ pub(crate) enum Unknown {
 }
 
 /// A block of a figure's rates. Numbers beyond its size are zero.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Rates {
     pub size: u8,
     /// At the start of the tick.

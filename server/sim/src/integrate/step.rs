@@ -70,8 +70,6 @@ pub(super) struct Solve {
 #[derive(Default)]
 pub(crate) struct Integrator {
     pub(super) islands: Islands,
-    /// Of all bodies that take part, in their order.
-    pub(super) unknowns: Vec<Unknown>,
     /// Bodies that take part, in order of serial.
     pub(super) active: Vec<Active>,
     pub(super) solves: Vec<Solve>,
@@ -100,11 +98,7 @@ impl Integrator {
 
     /// Solves one tick, and leaves everything as it was. Answers what the solver did.
     pub fn rehearse(&mut self, scene: &mut Scene) -> StepReport {
-        let forces: Vec<_> = scene.bodies.iter().map(|(id, body)| (id, body.force, body.torque)).collect();
         self.gather(scene);
-        for (id, force, torque) in forces {
-            (scene.bodies[id].force, scene.bodies[id].torque) = (force, torque);
-        }
         self.solve(scene.settings);
         let mut report = StepReport { bodies: self.active.len(), ..StepReport::default() };
         self.sum_up(&mut report);
@@ -128,8 +122,9 @@ impl Integrator {
         let solves = &mut self.solves[..self.islands.len()];
         share_budget(solves, settings.solver.budget);
         let solver = &settings.solver;
+        let blocks: usize = solves.iter().map(|solve| solve.problem.len()).sum();
         match &self.pool {
-            Some(pool) if solves.len() > 1 && self.unknowns.len() >= PARALLEL_BODIES_MIN => {
+            Some(pool) if solves.len() > 1 && blocks >= PARALLEL_BODIES_MIN => {
                 let workspaces = &self.pool_workspaces;
                 let run = |solve: &mut Solve| {
                     // Within the pool there is always an index, and its workspace is never asked for by another thread.
@@ -145,40 +140,63 @@ impl Integrator {
     fn scatter(&mut self, scene: &mut Scene) -> StepReport {
         let mut report = StepReport::default();
         self.sum_up(&mut report);
-        for (active, index) in self.active.iter().zip(0..) {
-            let problem = self.solves.get(self.islands.island_of(index) as usize).map(|solve| &solve.problem);
-            let body = &mut scene.bodies[active.id];
-            match (&self.unknowns[active.first as usize], problem) {
-                (Unknown::Body(node), problem) => {
-                    let twist = problem.map_or(node.target, |p| p.frames[active.start as usize].twist());
-                    let start = node.start;
-                    body.advance(node, twist, scene.settings.dt, scene.state);
-                    let linear = twist.linear - node.target.linear;
-                    body.impulse = Twist { linear, angular: twist.angular - node.target.angular };
-                    report.dof += if node.rotates { 6 } else { 3 };
-                    if !body.is_sane(scene.state) {
-                        body.quarantine(scene.state, |q| start.write(q));
-                        report.quarantined += 1;
-                    }
-                }
-                (Unknown::Rates(_), Some(problem)) => {
-                    let figure = &problem.figures.list()[active.figure as usize];
-                    body.advance_figure(&figure.q1, &figure.v1, scene.state);
-                    report.dof += figure.v1.len();
-                    if !body.is_sane(scene.state) {
-                        body.quarantine(scene.state, |q| q.copy_from_slice(&figure.q0));
-                        report.quarantined += 1;
-                    }
-                }
-                // A figure's blocks are always in an island.
-                (Unknown::Rates(_), None) => {}
+        for &id in scene.order {
+            let body = &mut scene.bodies[id];
+            if let Some(active) = self.active.get(body.index as usize) {
+                let solve = self.solves.get(self.islands.island_of(body.index) as usize);
+                land(body, active, solve, (scene.settings, scene.state), &mut report);
             }
-            report.bodies += 1;
+            // Forces are for one tick, whether the body takes part in it or not.
+            (body.force, body.torque) = Default::default();
         }
         for solve in &self.solves[..self.islands.len()] {
             solve.write_back(scene, &mut report);
         }
         report
+    }
+}
+
+/// Writes the state of a body at the end of the tick; `solve` is its island, where something acts on it.
+fn land(
+    body: &mut Body,
+    active: &Active,
+    solve: Option<&Solve>,
+    (settings, state): (&Settings, &mut State),
+    report: &mut StepReport,
+) {
+    report.bodies += 1;
+    match (&body.figure, solve) {
+        (None, solve) => {
+            let twist = |solve: &Solve| solve.problem.frames[active.start as usize].twist();
+            let solved = solve.and_then(|solve| Some((solve.node(active.start)?, twist(solve))));
+            let free;
+            let (node, twist) = match solved {
+                Some(solved) => solved,
+                None => {
+                    free = body.node(state, settings.dt, settings.gravity);
+                    (&free, free.target)
+                }
+            };
+            body.advance(node, twist, settings.dt, state);
+            let linear = twist.linear - node.target.linear;
+            body.impulse = Twist { linear, angular: twist.angular - node.target.angular };
+            report.dof += if node.rotates { 6 } else { 3 };
+            if !body.is_sane(state) {
+                body.quarantine(state, |q| node.start.write(q));
+                report.quarantined += 1;
+            }
+        }
+        (Some(_), Some(solve)) => {
+            let figure = &solve.problem.figures.list()[active.figure as usize];
+            body.advance_figure(&figure.q1, &figure.v1, state);
+            report.dof += figure.v1.len();
+            if !body.is_sane(state) {
+                body.quarantine(state, |q| q.copy_from_slice(&figure.q0));
+                report.quarantined += 1;
+            }
+        }
+        // A figure is always in an island.
+        (Some(_), None) => {}
     }
 }
 

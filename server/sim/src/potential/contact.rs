@@ -183,7 +183,8 @@ impl Term for ContactTerm {
         self.frames
     }
 
-    #[inline]
+    // The innermost loop of all: what is not asked for of the answer need not be written to memory.
+    #[inline(always)]
     fn evaluate<S: Scalar>(&self, dt: f64, at: [&Frame<S>; 2]) -> (S, [Wrench<S>; 2]) {
         let displacement = self.displacement(dt, at);
         let (integral, value) = normal_spline(self.depth(displacement), self.transition);
