@@ -4,7 +4,10 @@
 //! nothing, and where it compares with a peer, the peer runs in the same process and the same run.
 
 mod peers;
+mod solvers;
 mod tick;
+
+use std::path::PathBuf;
 
 use serde_json::{Map, Value};
 
@@ -17,6 +20,11 @@ pub const ENTRIES: &[Entry] = &[
         name: "peers",
         measures: "ours and rapier in turn on the yardstick's scenes: ms, ratio, quality; minutes",
         run: peers::run,
+    },
+    Entry {
+        name: "solvers",
+        measures: "which method is best: work and time of every solver and preconditioner; minutes",
+        run: solvers::run,
     },
 ];
 
@@ -41,6 +49,8 @@ pub struct Options {
     pub scenes: Vec<String>,
     /// Times that everything is run, the least of which counts; the entry's own number where there is none.
     pub rounds: Option<u32>,
+    /// Where `solvers` draws what it found.
+    pub plot: Option<PathBuf>,
 }
 
 /// Why an entry could not measure, for a person.

@@ -1,6 +1,7 @@
 //! `pita-bench [NAME..] [--json]`: measurements by name; see [`pita_tests::bench`].
 
 use std::alloc::System;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -41,6 +42,10 @@ struct Arguments {
     /// Times that `peers` runs everything in turn; the least time counts [default: 3]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: Option<u32>,
+
+    /// SVG that `solvers` draws
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
@@ -55,6 +60,7 @@ fn main() -> ExitCode {
         threads: arguments.threads.map(usize::from),
         scenes: arguments.scenes,
         rounds: arguments.rounds,
+        plot: arguments.plot,
     };
     match run(&arguments.names, &options, arguments.json) {
         Ok(()) => ExitCode::SUCCESS,
