@@ -54,19 +54,29 @@ pub(super) struct Factorization<const D: usize> {
 impl<const D: usize> Factorization<D> {
     /// Finds the pattern of L from that of `a`.
     pub fn analyse(&mut self, a: &Matrix<D>, fill: Fill) {
-        match fill {
+        self.analyse_within(a, fill, usize::MAX);
+    }
+
+    /// As [`analyse`](Self::analyse), unless L would have more than `blocks` below its diagonal. Answers whether it has
+    /// not.
+    pub fn analyse_within(&mut self, a: &Matrix<D>, fill: Fill, blocks: usize) -> bool {
+        let fits = match fill {
             Fill::Nothing => {
                 self.rows.clone_from(&a.rows);
                 self.columns.clone_from(&a.columns);
+                self.columns.len() <= blocks
             }
-            Fill::Complete => self.fill_in(a),
+            Fill::Complete => self.fill_in(a, blocks),
+        };
+        if fits {
+            self.diagonal.resize(a.diagonal.len(), zero());
+            self.lower.resize(self.columns.len(), zero());
         }
-        self.diagonal.resize(a.diagonal.len(), zero());
-        self.lower.resize(self.columns.len(), zero());
+        fits
     }
 
     /// Row by row: what a row of A touches, and the ancestors of that in the elimination tree (Liu, 1986).
-    fn fill_in(&mut self, a: &Matrix<D>) {
+    fn fill_in(&mut self, a: &Matrix<D>, blocks: usize) -> bool {
         let n = a.diagonal.len();
         for vector in [&mut self.parent, &mut self.reached] {
             vector.clear();
@@ -90,7 +100,11 @@ impl<const D: usize> Factorization<D> {
             }
             self.columns[self.rows[i] as usize..].sort_unstable();
             self.rows.push(self.columns.len() as u32);
+            if self.columns.len() > blocks {
+                return false;
+            }
         }
+        true
     }
 
     /// Multiply-adds of a factorisation whose fill is complete: each pair of blocks in a column is multiplied, a block

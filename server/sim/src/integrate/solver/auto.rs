@@ -2,7 +2,8 @@
 //!
 //! The symbolic factorisation tells exactly what a direct solution costs. Where that is no more than what incomplete
 //! factorisation with some iterations of conjugate gradients costs, as on trees and towers, where there is no fill at
-//! all, [`Newton`] it is; else [`TruncatedNewton`].
+//! all, [`Newton`] it is; else [`TruncatedNewton`]. How many iterations those are is a guess at first; from then on it is
+//! what they have been.
 
 use super::super::block::Entry;
 use super::super::matrix::Matrix;
@@ -19,28 +20,38 @@ const EXPECTED_ITERATIONS: u64 = 3;
 /// factorisation serves them badly. A beam of 200 tetrahedra takes 12.
 const EXPECTED_ITERATIONS_OF_MESHES: u64 = 12;
 
+/// Fill is followed up to so many times the work of the guess, in case the guess is too low.
+const PATIENCE: u64 = 4;
+
 /// Both methods and the choice.
 #[derive(Default)]
 pub(super) struct Auto<const D: usize> {
     newton: Newton<D>,
     truncated: TruncatedNewton<D>,
-    direct: bool,
+    /// Multiply-adds of a direct solution; `None` where that is out of the question.
+    direct_work: Option<u64>,
+    /// Iterations of conjugate gradients in the last Newton iteration.
+    linear_iterations: u64,
 }
 
 impl<const D: usize> Solver<D> for Auto<D> {
     fn direction(&mut self, mut at: Standpoint<D>, step: &mut Vec<Entry<D>>) -> usize {
         at.assemble();
         if at.iteration == 0 {
-            let expected =
-                if at.problem.figures.have_points() { EXPECTED_ITERATIONS_OF_MESHES } else { EXPECTED_ITERATIONS };
-            self.direct = self.newton.analyse(at.matrix) <= truncated_work(at.matrix, expected);
+            let has_mesh = at.problem.figures.have_points();
+            self.linear_iterations = if has_mesh { EXPECTED_ITERATIONS_OF_MESHES } else { EXPECTED_ITERATIONS };
+            let truncated = truncated_work(at.matrix, self.linear_iterations);
+            self.direct_work = self.newton.analyse_within(at.matrix, PATIENCE * truncated);
+            self.truncated.analyse(at.matrix, Preconditioner::IncompleteFactorization, at.settings);
         }
-        if self.direct {
+        let truncated = truncated_work(at.matrix, self.linear_iterations);
+        if self.direct_work.is_some_and(|direct| direct <= truncated) {
             self.newton.descend(&mut at, step);
-            1
-        } else {
-            self.truncated.solve(at, Preconditioner::IncompleteFactorization, step)
+            return 1;
         }
+        let iterations = self.truncated.descend(&mut at, step);
+        self.linear_iterations = iterations as u64;
+        iterations
     }
 }
 

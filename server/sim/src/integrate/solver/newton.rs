@@ -6,7 +6,7 @@ use super::super::block::Entry;
 use super::super::factorization::{Factorised, Factorization, Fill};
 use super::super::matrix::Matrix;
 use super::super::vector::negate;
-use super::work::Work;
+use super::work::{Work, block_product};
 use super::{Solver, Standpoint};
 
 /// The method's memory.
@@ -16,10 +16,18 @@ pub(super) struct Newton<const D: usize> {
 }
 
 impl<const D: usize> Newton<D> {
-    /// Finds the fill. Answers the multiply-adds that a solution will take.
-    pub fn analyse(&mut self, a: &Matrix<D>) -> u64 {
+    /// Finds the fill.
+    pub fn analyse(&mut self, a: &Matrix<D>) {
         self.factorization.analyse(a, Fill::Complete);
-        self.factorization.complete_work() + self.factorization.solve_work()
+    }
+
+    /// Finds the fill, and answers the multiply-adds of a solution, unless they are more than `most`.
+    pub fn analyse_within(&mut self, a: &Matrix<D>, most: u64) -> Option<u64> {
+        // Every block of the factor takes a product at least.
+        let blocks = usize::try_from(most / block_product(D)).unwrap_or(usize::MAX);
+        let Self { factorization, .. } = self;
+        let fits = factorization.analyse_within(a, Fill::Complete, blocks);
+        fits.then(|| factorization.complete_work() + factorization.solve_work()).filter(|&work| work <= most)
     }
 
     /// Factorises the matrix as it is. Answers how many of its pivots are not positive definite.

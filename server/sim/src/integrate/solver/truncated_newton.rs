@@ -3,9 +3,11 @@
 
 use super::super::block::Entry;
 use super::super::conjugate_gradient::ConjugateGradient;
+use super::super::matrix::Matrix;
 use super::super::preconditioner::{ApproximateInverse, Selected};
 use super::method::Preconditioner;
 use super::{Solver, Standpoint};
+use crate::settings::SolverSettings;
 
 /// The method's memory.
 #[derive(Default)]
@@ -15,15 +17,17 @@ pub(super) struct TruncatedNewton<const D: usize> {
 }
 
 impl<const D: usize> TruncatedNewton<D> {
-    /// Almost solves with the matrix as it is assembled, with a preconditioner of `kind`.
-    pub fn solve(&mut self, mut at: Standpoint<D>, kind: Preconditioner, step: &mut Vec<Entry<D>>) -> usize {
-        if at.iteration == 0 {
-            self.preconditioner.select(kind, at.settings.relaxation);
-            self.preconditioner.analyse(at.matrix);
-        }
-        let iterations = self.try_to_solve(&mut at, step);
+    /// Takes a preconditioner of `kind`, and what that needs from the matrix' pattern.
+    pub fn analyse(&mut self, a: &Matrix<D>, kind: Preconditioner, settings: &SolverSettings) {
+        self.preconditioner.select(kind, settings.relaxation);
+        self.preconditioner.analyse(a);
+    }
+
+    /// Almost solves with the matrix as it is assembled; with a definite one if it is not.
+    pub fn descend(&mut self, at: &mut Standpoint<D>, step: &mut Vec<Entry<D>>) -> usize {
+        let iterations = self.try_to_solve(at, step);
         if self.linear.met_negative_curvature() && at.assemble_definite() {
-            return iterations + self.try_to_solve(&mut at, step);
+            return iterations + self.try_to_solve(at, step);
         }
         iterations
     }
@@ -37,7 +41,9 @@ impl<const D: usize> TruncatedNewton<D> {
 impl<const D: usize> Solver<D> for TruncatedNewton<D> {
     fn direction(&mut self, mut at: Standpoint<D>, step: &mut Vec<Entry<D>>) -> usize {
         at.assemble();
-        let kind = at.settings.preconditioner;
-        self.solve(at, kind, step)
+        if at.iteration == 0 {
+            self.analyse(at.matrix, at.settings.preconditioner, at.settings);
+        }
+        self.descend(&mut at, step)
     }
 }
