@@ -10,6 +10,7 @@ use crate::error::SimError;
 pub enum Method {
     /// The cheapest for the island, by its size and couplings: [`Method::Newton`] where the exact factorisation is no
     /// dearer than conjugate gradients, else [`Method::TruncatedNewton`] with incomplete factorisation.
+    #[default]
     Auto,
     /// "Divide and conquer": every body on its own, the others where they were.
     Jacobi,
@@ -28,7 +29,6 @@ pub enum Method {
     /// L-BFGS: the inverse Hessian is built from the last steps.
     QuasiNewton,
     /// Newton with capped conjugate gradients and `preconditioner`. Cel Damage's on the GameCube.
-    #[default]
     TruncatedNewton,
     /// The same with a procedural Hessian: products by automatic differentiation.
     CelDamage,
