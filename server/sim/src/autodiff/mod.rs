@@ -165,6 +165,8 @@ impl<const N: usize> Sub for Dual<N> {
     }
 }
 
+// The rules of derivatives mix operators, which clippy takes for slips of the pen.
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl<const N: usize> Mul for Dual<N> {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
@@ -172,6 +174,7 @@ impl<const N: usize> Mul for Dual<N> {
     }
 }
 
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl<const N: usize> Div for Dual<N> {
     type Output = Self;
     fn div(self, other: Self) -> Self {

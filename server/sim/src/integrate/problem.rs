@@ -61,6 +61,8 @@ terms! {
 }
 
 /// A block of unknowns: rates at the end of the tick.
+// Nearly all unknowns are bodies, and they are read all the time: a box around them would cost more than it saves.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Unknown {
     /// The twist of a particle or rigid body.

@@ -81,6 +81,7 @@ pub(super) fn check_gradient(term: &impl Term, at: &[Frame<f64>; 2]) {
 
 /// Derivative of the gradient by automatic differentiation, row i column j; checked against central differences to
 /// `accuracy` of its largest diagonal entry.
+#[allow(clippy::needless_range_loop)] // The loops run over both indices of a matrix.
 pub(super) fn automatic_hessian(term: &impl Term, at: &[Frame<f64>; 2], accuracy: f64) -> [[f64; 12]; 12] {
     let mut hessian = [[0.0; 12]; 12];
     for j in 0..12 {
