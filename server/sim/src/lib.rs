@@ -45,7 +45,7 @@ pub use integrate::{Method, Preconditioner, StepReport, StoppedBecause};
 pub use potential::{
     Anchor, AngleLimitDesc, AngleLimitId, AxleControl, AxleDesc, AxleId, BallJointDesc, BallJointId, DistanceLimitDesc,
     DistanceLimitId, Driven, FixedJointDesc, FixedJointId, HingeDesc, HingeId, Motor, MotorDesc, MotorId, PdControl,
-    PdDesc, PdId, RodDesc, RodId, SliderDesc, SliderId, SpringDesc, SpringId,
+    PdDesc, PdId, RodDesc, RodId, SliderDesc, SliderId, SpringDesc, SpringId, UniversalJointDesc, UniversalJointId,
 };
 pub use settings::{ContactSettings, Settings, SolverSettings};
 pub use world::{Energy, Momentum, SliceView, World};

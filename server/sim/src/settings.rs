@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use crate::error::{SimError, require, require_vector};
 use crate::integrate::{Method, Preconditioner};
+use crate::potential::gravity::Gravity;
 
 /// Parameters of a [`World`](crate::World).
 #[derive(Clone, Debug, PartialEq)]
@@ -71,6 +72,11 @@ impl Settings {
             solver: SolverSettings::default(),
             contact: ContactSettings::default(),
         }
+    }
+
+    /// Gravity as a potential.
+    pub(crate) fn field(&self) -> Gravity {
+        Gravity { acceleration: self.gravity }
     }
 
     /// # Errors

@@ -27,6 +27,7 @@ pub use interface::{
 
 use crate::collide::Collider;
 use crate::error::{LARGEST, SimError, require, require_rotation, require_vector};
+use crate::potential::gravity::Gravity;
 use crate::state::{Slice, State};
 
 slotmap::new_key_type! {
@@ -261,7 +262,7 @@ impl Node {
 
 impl Body {
     /// The start of a tick of a particle or rigid body.
-    pub fn node(&self, state: &State, dt: f64, gravity: DVec3) -> Node {
+    pub fn node(&self, state: &State, dt: f64, gravity: Gravity) -> Node {
         let (q, v) = (state.q(self.slice), state.v(self.slice));
         match self.kind {
             DofKind::Particle => particle::node(self, q, v, dt, gravity),

@@ -3,6 +3,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::{Body, Node, Pose, Twist};
+use crate::potential::gravity::Gravity;
 use crate::state::State;
 
 /// Numbers in Q and in Q'.
@@ -16,13 +17,13 @@ pub(super) fn velocity(v: &[f64]) -> DVec3 {
     DVec3::from_slice(v)
 }
 
-pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: DVec3) -> Node {
+pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: Gravity) -> Node {
     let linear = velocity(v);
     Node {
         start: Pose { position: position(q), rotation: DQuat::IDENTITY },
         free_rotation: DQuat::IDENTITY,
         free_spin: DVec3::ZERO,
-        target: Twist { linear: linear + dt * (gravity + body.force / body.mass), angular: DVec3::ZERO },
+        target: Twist { linear: linear + gravity.fall(dt) + dt * (body.force / body.mass), angular: DVec3::ZERO },
         before: Twist { linear, angular: DVec3::ZERO },
         impulse: body.impulse,
         mass: body.mass,

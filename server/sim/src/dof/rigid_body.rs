@@ -4,6 +4,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::{Body, Node, Pose, Twist};
+use crate::potential::gravity::Gravity;
 use crate::state::State;
 
 /// Numbers in Q and in Q'.
@@ -23,7 +24,7 @@ pub(super) fn twist(v: &[f64]) -> Twist {
     Twist { linear: DVec3::from_slice(v), angular: DVec3::from_slice(&v[3..]) }
 }
 
-pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: DVec3) -> Node {
+pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: Gravity) -> Node {
     let (start, before) = (pose(q), twist(v));
     let wheel_axis = body.is_wheel.then(|| start.rotation * DVec3::Z);
     let free_rotation = match wheel_axis {
@@ -35,7 +36,7 @@ pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: DVec3) -
     let momentum = world_inertia(start.rotation, body.inertia) * before.angular;
     let carried_spin = inverse_inertia * momentum;
     let target = Twist {
-        linear: before.linear + dt * (gravity + body.force / body.mass),
+        linear: before.linear + gravity.fall(dt) + dt * (body.force / body.mass),
         angular: carried_spin + dt * (inverse_inertia * body.torque),
     };
     let free_spin = if body.is_wheel { DVec3::ZERO } else { carried_spin };

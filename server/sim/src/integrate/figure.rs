@@ -11,6 +11,7 @@ use super::block::{Block, Entry, zero};
 use super::pull_back::{add_block, inertia_block, multiplied, projected};
 use crate::dof::{Dof, FigureBody, Frame, Inertia, LocalState, PartInertia, PartLoad, PartPoint, PointMasses, Twist};
 use crate::potential::Wrench;
+use crate::potential::gravity::Gravity;
 
 /// A body of a general kind in an island.
 pub(crate) struct Figure {
@@ -105,7 +106,7 @@ impl Figures {
     }
 
     /// Attaches the parts' centres of mass, where parts carry the mass.
-    pub fn attach_parts(&mut self, index: u32, dt: f64, gravity: DVec3) {
+    pub fn attach_parts(&mut self, index: u32, dt: f64, gravity: Gravity) {
         let dof = Arc::clone(&self.list[index as usize].dof);
         let start = self.attachments.len() as u32;
         self.list[index as usize].free_momenta.clear();
@@ -113,7 +114,7 @@ impl Figures {
             for (part, inertia) in (0..).zip(parts) {
                 let k = self.attach(index, PartPoint { part, point: inertia.centre }, false);
                 let momentum = part_momentum(&self.attachments[k as usize].start, inertia.mass, inertia.inertia);
-                let fall = Wrench { force: (gravity * (inertia.mass * dt)).into(), torque: Wrench::ZERO.torque };
+                let fall = Wrench { force: (gravity.fall(dt) * inertia.mass).into(), torque: Wrench::ZERO.torque };
                 let mut free = momentum;
                 free += fall;
                 self.list[index as usize].free_momenta.push(free);
@@ -182,7 +183,7 @@ impl Figures {
     pub fn evaluate<const D: usize>(
         &mut self,
         dt: f64,
-        gravity: DVec3,
+        gravity: Gravity,
         frames: &[Frame<f64>],
         residual: &mut [Entry<D>],
     ) -> f64 {
@@ -370,7 +371,7 @@ impl Figure {
     fn evaluate<const D: usize>(
         &mut self,
         dt: f64,
-        gravity: DVec3,
+        gravity: Gravity,
         attached: &[Frame<f64>],
         wrenches: &mut [Wrench],
         residual: &mut [Entry<D>],
@@ -387,7 +388,7 @@ impl Figure {
         self.gradient = gradient;
         let dof = Arc::clone(&self.dof);
         energy += match dof.inertia() {
-            Inertia::Points(masses) => self.evaluate_points(masses, dt * gravity, residual),
+            Inertia::Points(masses) => self.evaluate_points(masses, gravity.fall(dt), residual),
             Inertia::Parts(parts) => {
                 let all = (self.parts.start as usize..).zip(parts).zip(&self.free_momenta);
                 all.map(|((k, part), &free)| {

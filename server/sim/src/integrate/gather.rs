@@ -204,7 +204,7 @@ impl Integrator {
 impl Solve {
     /// Takes a body into the island, with its share of all `unknowns`.
     fn take_in(&mut self, active: &mut Active, scene: &Scene) {
-        let Settings { dt, gravity, .. } = *scene.settings;
+        let (dt, gravity) = (scene.settings.dt, scene.settings.field());
         let body = &scene.bodies[active.id];
         let start = self.problem.unknowns.len();
         active.start = start as u32;
@@ -215,7 +215,7 @@ impl Solve {
         };
         let state = [scene.state.q(body.slice), scene.state.v(body.slice)];
         unknowns.resize(start + figure.ranks.len(), Unknown::Rates(Rates::default()));
-        for (&rank, rates) in figure.ranks.iter().zip(rates(figure, state[1], dt * gravity)) {
+        for (&rank, rates) in figure.ranks.iter().zip(rates(figure, state[1], gravity.fall(dt))) {
             unknowns[start + rank as usize] = Unknown::Rates(rates);
         }
         let blocks = figure.ranks.iter().map(|rank| active.start + rank);

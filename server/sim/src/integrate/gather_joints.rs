@@ -10,6 +10,7 @@ use crate::potential::limit::AngleLimitTerm;
 use crate::potential::motor::MotorTerm;
 use crate::potential::rod::RodTerm;
 use crate::potential::slider::LineTerm;
+use crate::potential::universal_joint::UniversalJointTerm;
 use crate::potential::{Driven, MotorDesc};
 
 impl Integrator {
@@ -22,6 +23,15 @@ impl Integrator {
             let turns = Alignment::new([axis], desc.tilt, solve.turn_scale(ends, least), memory);
             solve.problem.terms.hinges.push(Aligned { place, turns });
             solve.hinges.push(id);
+        }
+        for (id, &Held { desc, memory }) in &scene.potentials.universal_joints {
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let scale = solve.scale(ends, solve.places(ends), least);
+            let place = BallJointTerm::new(ends, desc.tolerance, scale, memory);
+            let axes = [desc.axis_a.normalize(), desc.axis_b.normalize()];
+            let term = UniversalJointTerm::new(place, axes, desc.tilt, solve.turn_scale(ends, least), memory);
+            solve.problem.terms.universal_joints.push(term);
+            solve.universal_joints.push(id);
         }
         for (id, &Held { desc: Captured { desc, axes }, memory }) in &scene.potentials.fixed_joints {
             let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };

@@ -10,6 +10,7 @@ use crate::potential::axle::AxleTerm;
 use crate::potential::ball_joint::BallJointTerm;
 use crate::potential::contact::ContactTerm;
 use crate::potential::fixed_joint::FixedJointTerm;
+use crate::potential::gravity::Gravity;
 use crate::potential::hinge::HingeTerm;
 use crate::potential::limit::AngleLimitTerm;
 use crate::potential::motor::MotorTerm;
@@ -17,6 +18,7 @@ use crate::potential::pd::PdTerm;
 use crate::potential::rod::RodTerm;
 use crate::potential::slider::SliderTerm;
 use crate::potential::spring::SpringTerm;
+use crate::potential::universal_joint::UniversalJointTerm;
 use crate::potential::{FIXED, FrameIndex, Term, Wrench};
 
 /// Something to be done with every potential, in a fixed order.
@@ -51,6 +53,7 @@ terms! {
     own_rods: RodTerm,
     ball_joints: BallJointTerm,
     hinges: HingeTerm,
+    universal_joints: UniversalJointTerm,
     fixed_joints: FixedJointTerm,
     sliders: SliderTerm,
     distance_limits: RodTerm,
@@ -174,7 +177,7 @@ impl Unknown {
 #[derive(Default)]
 pub(crate) struct Problem {
     pub dt: f64,
-    pub gravity: DVec3,
+    pub gravity: Gravity,
     pub unknowns: Vec<Unknown>,
     pub terms: Terms,
     pub figures: Figures,
@@ -194,7 +197,7 @@ pub(super) struct ProductMemory {
 
 impl Problem {
     /// Starts an island of no bodies.
-    pub fn clear(&mut self, dt: f64, gravity: DVec3) {
+    pub fn clear(&mut self, dt: f64, gravity: Gravity) {
         (self.dt, self.gravity) = (dt, gravity);
         self.unknowns.clear();
         self.terms.clear();

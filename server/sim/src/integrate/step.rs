@@ -16,7 +16,7 @@ use crate::dof::{Body, BodyId, Placed, Twist};
 use crate::island::Islands;
 use crate::potential::hold::{Joint, Memory};
 use crate::potential::{
-    AngleLimitId, BallJointId, DistanceLimitId, FixedJointId, HingeId, Potentials, RodId, SliderId,
+    AngleLimitId, BallJointId, DistanceLimitId, FixedJointId, HingeId, Potentials, RodId, SliderId, UniversalJointId,
 };
 use crate::settings::{Settings, SolverSettings};
 use crate::state::State;
@@ -60,6 +60,7 @@ pub(super) struct Solve {
     pub own_rods: Vec<(BodyId, u32)>,
     pub ball_joints: Vec<BallJointId>,
     pub hinges: Vec<HingeId>,
+    pub universal_joints: Vec<UniversalJointId>,
     pub fixed_joints: Vec<FixedJointId>,
     pub sliders: Vec<SliderId>,
     pub distance_limits: Vec<DistanceLimitId>,
@@ -173,7 +174,7 @@ fn land(
             let (node, twist) = match solved {
                 Some(solved) => solved,
                 None => {
-                    free = body.node(state, settings.dt, settings.gravity);
+                    free = body.node(state, settings.dt, settings.field());
                     (&free, free.target)
                 }
             };
@@ -214,13 +215,14 @@ impl Workspace {
 impl Solve {
     /// Starts a tick with an island of no bodies.
     pub fn clear(&mut self, settings: &Settings) {
-        self.problem.clear(settings.dt, settings.gravity);
+        self.problem.clear(settings.dt, settings.field());
         self.mass = 0.0;
         self.contacts.clear();
         self.rods.clear();
         self.own_rods.clear();
         self.ball_joints.clear();
         self.hinges.clear();
+        self.universal_joints.clear();
         self.fixed_joints.clear();
         self.sliders.clear();
         self.distance_limits.clear();
@@ -245,6 +247,9 @@ impl Solve {
         }
         for (term, &id) in problem.terms.hinges.iter().zip(&self.hinges) {
             potentials.hinges[id].memory = account(problem, term, report);
+        }
+        for (term, &id) in problem.terms.universal_joints.iter().zip(&self.universal_joints) {
+            potentials.universal_joints[id].memory = account(problem, term, report);
         }
         for (term, &id) in problem.terms.fixed_joints.iter().zip(&self.fixed_joints) {
             potentials.fixed_joints[id].memory = account(problem, term, report);

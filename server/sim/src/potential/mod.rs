@@ -10,6 +10,7 @@ pub(crate) mod ball_joint;
 pub(crate) mod contact;
 pub mod elasticity;
 pub(crate) mod fixed_joint;
+pub(crate) mod gravity;
 pub(crate) mod hinge;
 pub(crate) mod hold;
 pub(crate) mod limit;
@@ -20,6 +21,7 @@ pub(crate) mod slider;
 pub(crate) mod spring;
 #[cfg(test)]
 mod tests;
+pub(crate) mod universal_joint;
 
 use std::ops::AddAssign;
 
@@ -39,6 +41,7 @@ pub use pd::{PdControl, PdDesc, PdId};
 pub use rod::{RodDesc, RodId};
 pub use slider::{SliderDesc, SliderId};
 pub use spring::{SpringDesc, SpringId};
+pub use universal_joint::{UniversalJointDesc, UniversalJointId};
 
 use crate::autodiff::{Dual, Scalar, Vec3};
 use crate::dof::{BodyId, Frame, Twist};
@@ -80,6 +83,7 @@ pub(crate) struct Potentials {
     pub ball_joints: SlotMap<BallJointId, Held<BallJointDesc>>,
     /// With the axis and the direction of angle 0.
     pub hinges: SlotMap<HingeId, Held<Captured<HingeDesc, 2>>>,
+    pub universal_joints: SlotMap<UniversalJointId, Held<UniversalJointDesc>>,
     pub fixed_joints: SlotMap<FixedJointId, Held<Captured<FixedJointDesc, 3>>>,
     pub sliders: SlotMap<SliderId, Held<Captured<SliderDesc, 3>>>,
     pub distance_limits: SlotMap<DistanceLimitId, Held<DistanceLimitDesc>>,
@@ -97,12 +101,13 @@ impl Potentials {
         let rods = self.rods.values().map(|r| [r.desc.a, r.desc.b]);
         let ball_joints = self.ball_joints.values().map(|j| [j.desc.a, j.desc.b]);
         let hinges = self.hinges.values().map(|h| [h.desc.desc.a, h.desc.desc.b]);
+        let universal_joints = self.universal_joints.values().map(|j| [j.desc.a, j.desc.b]);
         let fixed_joints = self.fixed_joints.values().map(|j| [j.desc.desc.a, j.desc.desc.b]);
         let sliders = self.sliders.values().map(|s| [s.desc.desc.a, s.desc.desc.b]);
         let limits = self.distance_limits.values().map(|l| [l.desc.a, l.desc.b]);
         let axles = self.axles.values().map(move |a| [centre(a.chassis), centre(a.wheel)]);
         let pds = self.pds.values().map(|(pd, _)| [pd.at, Anchor::world(DVec3::ZERO)]);
-        let joints = ball_joints.chain(hinges).chain(fixed_joints).chain(sliders);
+        let joints = ball_joints.chain(hinges).chain(universal_joints).chain(fixed_joints).chain(sliders);
         springs.chain(rods).chain(joints).chain(limits).chain(axles).chain(pds)
     }
 
@@ -113,6 +118,7 @@ impl Potentials {
         self.rods.retain(|_, r| stays([r.desc.a.body, r.desc.b.body]));
         self.ball_joints.retain(|_, j| stays([j.desc.a.body, j.desc.b.body]));
         self.hinges.retain(|_, h| stays([h.desc.desc.a.body, h.desc.desc.b.body]));
+        self.universal_joints.retain(|_, j| stays([j.desc.a.body, j.desc.b.body]));
         self.fixed_joints.retain(|_, j| stays([j.desc.desc.a.body, j.desc.desc.b.body]));
         self.sliders.retain(|_, s| stays([s.desc.desc.a.body, s.desc.desc.b.body]));
         self.distance_limits.retain(|_, l| stays([l.desc.a.body, l.desc.b.body]));

@@ -14,6 +14,7 @@ use super::pd::PdTerm;
 use super::rod::RodTerm;
 use super::slider::LineTerm;
 use super::spring::SpringTerm;
+use super::universal_joint::UniversalJointTerm;
 use super::*;
 use crate::autodiff::Dual;
 use crate::collide::ContactPoint;
@@ -275,6 +276,24 @@ proptest! {
         let mut fixed = Aligned { place, turns };
         fixed.relinearise(DT, [&t, &u]);
         check_hessian(&fixed, &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn universal_joint_derives(a in vector(), b in vector(), x in direction(), y in direction(), t in frame(), u in frame()) {
+        let place = BallJointTerm::new(ends(a, b), 1e-3, SCALE, Memory::default());
+        let term = UniversalJointTerm::new(place, [x, y], 1e-3, SCALE, Memory::default());
+        check_gradient(&term, &[t, u]);
+        automatic_hessian(&term, &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn closed_universal_joint_has_the_exact_hessian(a in vector(), b in vector(), x in direction(), t in frame(), mut u in frame()) {
+        u.position = t.position + t.arm(a) - u.arm(b);
+        let across = u.rotation.transposed_multiply(t.arm(x.any_orthonormal_vector())).into();
+        let place = BallJointTerm::new(ends(a, b), 1e-3, SCALE, Memory::default());
+        let mut term = UniversalJointTerm::new(place, [x, across], 1e-3, SCALE, Memory::default());
+        term.relinearise(DT, [&t, &u]);
+        check_hessian(&term, &[t, u], 1e-5);
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::potential::hold::Held;
 use crate::potential::limit::hinge_angle;
 use crate::potential::{
     Anchor, AngleLimitDesc, AngleLimitId, DistanceLimitDesc, DistanceLimitId, Driven, FixedJointDesc, FixedJointId,
-    HingeDesc, HingeId, Motor, MotorDesc, MotorId, SliderDesc, SliderId,
+    HingeDesc, HingeId, Motor, MotorDesc, MotorId, SliderDesc, SliderId, UniversalJointDesc, UniversalJointId,
 };
 
 impl World {
@@ -30,6 +30,17 @@ impl World {
         let zeros = [local(&a, zero), local(&b, zero)];
         self.exclude(desc.a, desc.b);
         Ok(self.potentials.hinges.insert(Held::new(Captured { desc, axes: [axes, zeros] })))
+    }
+
+    /// Adds a universal joint.
+    ///
+    /// # Errors
+    /// As [`World::add_hinge`].
+    pub fn add_universal_joint(&mut self, desc: UniversalJointDesc) -> Result<UniversalJointId, SimError> {
+        desc.validate()?;
+        self.check_turning(desc.a, desc.b)?;
+        self.exclude(desc.a, desc.b);
+        Ok(self.potentials.universal_joints.insert(Held::new(desc)))
     }
 
     /// Adds a fixed joint.
@@ -122,6 +133,13 @@ impl World {
         let Some(hinge) = self.potentials.hinges.remove(id) else { return false };
         self.potentials.remove_orphans();
         self.include(hinge.desc.desc.a, hinge.desc.desc.b);
+        true
+    }
+
+    /// Removes a universal joint. Answers whether there was one.
+    pub fn remove_universal_joint(&mut self, id: UniversalJointId) -> bool {
+        let Some(joint) = self.potentials.universal_joints.remove(id) else { return false };
+        self.include(joint.desc.a, joint.desc.b);
         true
     }
 

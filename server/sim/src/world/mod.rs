@@ -397,7 +397,7 @@ impl World {
         for body in self.bodies.values() {
             let motion = body.motion(&self.state);
             energy.kinetic += motion.energy;
-            energy.gravitational -= self.settings.gravity.dot(motion.moment);
+            energy.gravitational += self.settings.field().energy(motion.moment);
             if let Some(figure) = &body.figure {
                 let (q, v) = (self.state.q(body.slice), self.state.v(body.slice));
                 energy.elastic += figure.stored_energy(q, v, self.settings.dt);

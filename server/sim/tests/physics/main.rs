@@ -9,6 +9,7 @@ mod hostile;
 mod joints;
 mod lattice;
 mod natural;
+mod over_determined;
 mod own_kind;
 mod potentials;
 mod sheep;
