@@ -4,14 +4,14 @@
 use std::sync::Arc;
 
 use pita_sim::{
-    Anchor, BallJointDesc, BodyId, DQuat, DVec3, DofKind, FigureDesc, Natural, NaturalDesc, NaturalPart, PartPoint,
-    RigidBodyDesc, World,
+    Anchor, BallJointDesc, BodyId, Collider, DQuat, DVec3, DofKind, FigureDesc, Natural, NaturalDesc, NaturalPart,
+    PartCollider, PartPoint, RigidBodyDesc, World,
 };
 
 use super::sheep::{
-    EAR, HEAD, PARTS, Poses, add_articulated, centre_of_mass, coordinates, hang, hung_and_turned, period,
+    EAR, HEAD, PARTS, Poses, SheepPart, add_articulated, centre_of_mass, coordinates, hang, hung_and_turned, period,
 };
-use super::{DT, weightless, world};
+use super::{DT, ground, particle, weightless, world};
 
 /// The points of each part, in its own frame; the first is its joint, and of the body the first three are the others'.
 const POINTS: [[DVec3; 4]; 4] = [
@@ -48,8 +48,16 @@ fn natural() -> Natural {
     Natural::new(desc.with_edges()).unwrap()
 }
 
+fn colliders_of_parts() -> Vec<PartCollider> {
+    let collider = |(part, desc): (u32, &SheepPart)| PartCollider {
+        at: PartPoint { part, point: DVec3::ZERO },
+        collider: Collider::new(desc.shape(), 0.5),
+    };
+    (0..).zip(&PARTS).map(collider).collect()
+}
+
 /// Adds the sheep in natural coordinates with its parts at `poses`, whose joints are closed.
-fn add_natural(world: &mut World, poses: &Poses) -> BodyId {
+fn add_natural(world: &mut World, poses: &Poses, colliders: bool) -> BodyId {
     let dof = natural();
     let mut q = vec![0.0; 39];
     for (i, (position, rotation)) in poses.iter().enumerate() {
@@ -58,7 +66,8 @@ fn add_natural(world: &mut World, poses: &Poses) -> BodyId {
             q[3 * point as usize..][..3].copy_from_slice(&at.to_array());
         }
     }
-    world.add_figure(FigureDesc { dof: Arc::new(dof), q, v: vec![0.0; 39], colliders: Vec::new() }).unwrap()
+    let colliders = if colliders { colliders_of_parts() } else { Vec::new() };
+    world.add_figure(FigureDesc { dof: Arc::new(dof), q, v: vec![0.0; 39], colliders }).unwrap()
 }
 
 /// Adds the sheep as four rigid bodies with three ball joints.
@@ -93,7 +102,7 @@ fn forms(new: fn() -> World, poses: &Poses, hung: bool) -> [Form; 3] {
     let (mut a, mut b, mut c) = (new(), new(), new());
     let bodies = add_rigid(&mut a, poses);
     let articulated = add_articulated(&mut b, coordinates(poses), false);
-    let natural = add_natural(&mut c, poses);
+    let natural = add_natural(&mut c, poses, false);
     if hung {
         hang(&mut a, bodies[HEAD as usize], 0);
         hang(&mut b, articulated, HEAD);
@@ -171,5 +180,39 @@ fn the_three_forms_tumble_as_documented() {
                 assert!((kept.0 - spin).abs() < 0.02 && (kept.1 - rest).abs() < 0.02, "{name}, tick {tick}: {kept:?}");
             }
         }
+    }
+}
+
+/// Set down on its feet it stands, falls over in its own time, and comes to rest.
+#[test]
+fn the_natural_sheep_lands_on_its_feet_and_rests() {
+    let mut world = world();
+    ground(&mut world);
+    let sheep = add_natural(&mut world, &PARTS.each_ref().map(|p| (p.centre + DVec3::Y * 1.8, DQuat::IDENTITY)), true);
+    for tick in 0..240 {
+        let report = world.step();
+        assert!(report.worst_penetration < 0.01 && report.open_joints == 0, "tick {tick}: {report:?}");
+        let height = world.position(sheep).unwrap().y;
+        assert!(!(20..60).contains(&tick) || (height - 0.8).abs() < 2e-3, "tick {tick}: {height}");
+    }
+    assert!(world.energy().kinetic < 1e-3, "{:?}", world.energy());
+}
+
+/// A sheep torn apart is pulled together again, or quarantined: nothing else hears of it.
+#[test]
+fn a_torn_natural_sheep_hurts_nobody() {
+    for speed in [1e3, 1e6, 9e8] {
+        let mut world = world();
+        let sheep = add_natural(&mut world, &PARTS.each_ref().map(|p| (p.centre, DQuat::IDENTITY)), false);
+        let bystander = particle(&mut world, DVec3::ZERO, DVec3::ZERO, 1.0);
+        let q = world.slice(sheep).unwrap().q.to_vec();
+        let v: Vec<f64> = (0..39).map(|i| speed * f64::from(i * 7 % 5 - 2) / 2.0).collect();
+        world.set_slice(sheep, &q, &v).unwrap();
+        for _ in 0..30 {
+            world.step();
+        }
+        let slice = world.slice(sheep).unwrap();
+        assert!(slice.q.iter().chain(slice.v).all(|x| x.is_finite()), "{speed}");
+        assert!((world.velocity(bystander).unwrap().y + 9.81).abs() < 1e-9);
     }
 }
