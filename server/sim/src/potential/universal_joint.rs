@@ -3,13 +3,14 @@
 
 use glam::DVec3;
 
-use super::alignment::{TILT, require_tilt};
+use super::alignment::TILT;
 use super::ball_joint::BallJointTerm;
-use super::hold::{Hold, Joint, Memory, Scale, TOLERANCE, require_tolerance};
+use super::hinge::HingeDesc;
+use super::hold::{Hold, Joint, Memory, Scale, TOLERANCE};
 use super::{Anchor, FrameIndex, PairBlocks, Term, Wrench, outer};
 use crate::autodiff::{Scalar, Vec3};
 use crate::dof::{Frame, Twist};
-use crate::error::{SimError, require_direction, require_vector};
+use crate::error::SimError;
 
 slotmap::new_key_type! {
     /// Handle of a universal joint.
@@ -40,12 +41,9 @@ impl UniversalJointDesc {
     }
 
     pub(crate) fn validate(&self) -> Result<(), SimError> {
-        require_vector(self.a.point, "a.point")?;
-        require_vector(self.b.point, "b.point")?;
-        require_direction(self.axis_a, "axis_a")?;
-        require_direction(self.axis_b, "axis_b")?;
-        require_tolerance(self.tolerance)?;
-        require_tilt(self.tilt)
+        // The numbers are a hinge's, within the same ranges.
+        let Self { a, b, axis_a, axis_b, tolerance, tilt } = *self;
+        HingeDesc { a, b, axis_a, axis_b, tolerance, tilt }.validate()
     }
 }
 
