@@ -1,0 +1,124 @@
+//! Bodies and static geometry: added, checked and removed.
+
+use glam::DVec3;
+
+use super::World;
+use crate::collide::{Collider, StaticDesc, StaticId};
+use crate::dof::{
+    self, ABSENT, Body, BodyId, DofKind, FigureBody, FigureDesc, PartPoint, ParticleDesc, Placed, Pose, RigidBodyDesc,
+    Twist, particle, rigid_body,
+};
+use crate::error::SimError;
+
+impl World {
+    /// Adds a rigid body.
+    ///
+    /// # Errors
+    /// [`SimError`] naming the value that is out of range.
+    pub fn add_rigid_body(&mut self, desc: RigidBodyDesc) -> Result<BodyId, SimError> {
+        dof::validate_rigid_body(&desc)?;
+        let id = self.add_body(DofKind::RigidBody, rigid_body::SIZE, desc.mass, desc.inertia, desc.collider);
+        let body = &self.bodies[id];
+        body.set_pose(Pose { position: desc.position, rotation: desc.rotation.normalize() }, &mut self.state);
+        body.set_twist(Twist { linear: desc.velocity, angular: desc.angular_velocity }, &mut self.state);
+        Ok(id)
+    }
+
+    /// Adds a particle.
+    ///
+    /// # Errors
+    /// [`SimError`] naming the value that is out of range.
+    pub fn add_particle(&mut self, desc: ParticleDesc) -> Result<BodyId, SimError> {
+        dof::validate_particle(&desc)?;
+        let id = self.add_body(DofKind::Particle, particle::SIZE, desc.mass, DVec3::ZERO, desc.collider);
+        let body = &self.bodies[id];
+        body.set_pose(Pose { position: desc.position, ..Pose::IDENTITY }, &mut self.state);
+        body.set_twist(Twist { linear: desc.velocity, ..Twist::REST }, &mut self.state);
+        Ok(id)
+    }
+
+    /// Adds a body of a general kind.
+    ///
+    /// # Errors
+    /// [`SimError`] naming the value that is out of range.
+    pub fn add_figure(&mut self, desc: FigureDesc) -> Result<BodyId, SimError> {
+        desc.validate(self.settings.dt)?;
+        let rates = desc.v.len() as u32;
+        let (kind, q, v) = (desc.dof.kind(), desc.q.clone(), desc.v.clone());
+        let figure = FigureBody::new(desc);
+        let id = self.add_body(kind, (q.len() as u32, rates), figure.mass, DVec3::ZERO, None);
+        for (index, part) in (0..).zip(&figure.colliders) {
+            // The first collider is found under the body's own serial.
+            let serial = self.serials - u32::from(index == 0);
+            self.serials = serial + 1;
+            self.placed.push(Placed { serial, body: id, at: part.at, index });
+        }
+        let body = &mut self.bodies[id];
+        body.figure = Some(figure);
+        self.state.q_mut(body.slice).copy_from_slice(&q);
+        self.state.v_mut(body.slice).copy_from_slice(&v);
+        Ok(id)
+    }
+
+    /// Removes a body with every potential and contact that it has. Answers whether there was one.
+    pub fn remove_body(&mut self, id: BodyId) -> bool {
+        let Some(body) = self.bodies.remove(id) else { return false };
+        self.state.free(body.slice);
+        self.order.retain(|&other| other != id);
+        self.potentials.remove_body(id);
+        self.detector.forget(body.serial);
+        let Self { placed, detector, .. } = self;
+        placed.iter().filter(|placed| placed.body == id).for_each(|placed| detector.forget_contacts(placed.serial));
+        placed.retain(|placed| placed.body != id);
+        true
+    }
+
+    fn add_body(
+        &mut self,
+        kind: DofKind,
+        size: (u32, u32),
+        mass: f64,
+        inertia: DVec3,
+        collider: Option<Collider>,
+    ) -> BodyId {
+        let (slice, serial) = (self.state.allocate(size.0, size.1), self.serials);
+        self.serials += 1;
+        let (force, torque, impulse, index) = (DVec3::ZERO, DVec3::ZERO, Twist::REST, ABSENT);
+        let (is_wheel, quarantined) = (false, false);
+        let (has_collider, figure) = (collider.is_some(), None);
+        let id = self.bodies.insert(Body {
+            kind,
+            slice,
+            serial,
+            mass,
+            inertia,
+            collider,
+            figure,
+            force,
+            torque,
+            impulse,
+            index,
+            is_wheel,
+            quarantined,
+        });
+        self.order.push(id);
+        if has_collider {
+            let at = PartPoint { part: 0, point: DVec3::ZERO };
+            self.placed.push(Placed { serial, body: id, at, index: 0 });
+        }
+        id
+    }
+
+    /// Adds a piece of static geometry.
+    ///
+    /// # Errors
+    /// [`SimError`] naming the value that is out of range.
+    pub fn add_static(&mut self, desc: StaticDesc) -> Result<StaticId, SimError> {
+        self.detector.add_static(desc)
+    }
+
+    /// Removes a piece of static geometry. Answers whether there was one.
+    pub fn remove_static(&mut self, id: StaticId) -> bool {
+        self.detector.remove_static(id)
+    }
+}

@@ -1,0 +1,194 @@
+//! The state of bodies: read, set, pushed and steered.
+
+use glam::{DQuat, DVec3};
+
+use super::World;
+use crate::dof::{BodyId, DofKind, Frame, PartPoint, Pose, Twist};
+use crate::error::{LARGEST, SimError, require, require_rotation, require_vector};
+
+/// A body's share of Q and Q'.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SliceView<'a> {
+    /// Names the body for as long as the world lives; never used twice.
+    pub serial: u32,
+    /// What the numbers mean.
+    pub kind: DofKind,
+    /// Positions: m, and a unit quaternion x y z w for a rigid body.
+    pub q: &'a [f64],
+    /// Rates: m/s, and rad/s in world axes for a rigid body.
+    pub v: &'a [f64],
+}
+
+impl World {
+    /// Centre of mass, m.
+    pub fn position(&self, id: BodyId) -> Option<DVec3> {
+        Some(self.bodies.get(id)?.pose(&self.state).position)
+    }
+
+    /// Principal axes to world.
+    pub fn rotation(&self, id: BodyId) -> Option<DQuat> {
+        Some(self.bodies.get(id)?.pose(&self.state).rotation)
+    }
+
+    /// Of the centre of mass, m/s.
+    pub fn velocity(&self, id: BodyId) -> Option<DVec3> {
+        Some(self.bodies.get(id)?.twist(&self.state).linear)
+    }
+
+    /// In world axes, rad/s.
+    pub fn angular_velocity(&self, id: BodyId) -> Option<DVec3> {
+        Some(self.bodies.get(id)?.twist(&self.state).angular)
+    }
+
+    /// kg.
+    pub fn mass(&self, id: BodyId) -> Option<f64> {
+        Some(self.bodies.get(id)?.mass)
+    }
+
+    /// What snapshots call the body; never used twice.
+    pub fn serial(&self, id: BodyId) -> Option<u32> {
+        Some(self.bodies.get(id)?.serial)
+    }
+
+    /// Whether the body's state became non-finite and it was taken out of dynamics and collision.
+    pub fn is_quarantined(&self, id: BodyId) -> bool {
+        self.bodies.get(id).is_some_and(|body| body.quarantined)
+    }
+
+    /// Puts a body somewhere else; its contacts of the last tick are forgotten, and so is a quarantine.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, or a body that is gone.
+    pub fn set_pose(&mut self, id: BodyId, position: DVec3, rotation: DQuat) -> Result<(), SimError> {
+        require_vector(position, "position")?;
+        require_rotation(rotation, "rotation")?;
+        let body = self.simple_body(id)?;
+        let body = &mut self.bodies[body];
+        body.set_pose(Pose { position, rotation: rotation.normalize() }, &mut self.state);
+        body.quarantined = false;
+        body.impulse = Twist::REST;
+        let serial = body.serial;
+        self.detector.forget_contacts(serial);
+        Ok(())
+    }
+
+    /// Sets velocity, m/s, and angular velocity, rad/s in world axes.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, or a body that is gone.
+    pub fn set_velocity(&mut self, id: BodyId, linear: DVec3, angular: DVec3) -> Result<(), SimError> {
+        require_vector(linear, "velocity")?;
+        require_vector(angular, "angular_velocity")?;
+        let body = &self.bodies[self.simple_body(id)?];
+        body.set_twist(Twist { linear, angular }, &mut self.state);
+        Ok(())
+    }
+
+    /// Pushes a body during the coming tick with `force`, N, at the world point `at`, m.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, or a body that is gone.
+    pub fn apply_force(&mut self, id: BodyId, force: DVec3, at: DVec3) -> Result<(), SimError> {
+        require_vector(force, "force")?;
+        require_vector(at, "at")?;
+        let id = self.simple_body(id)?;
+        let body = &mut self.bodies[id];
+        let arm = at - body.pose(&self.state).position;
+        body.force += force;
+        body.torque += arm.cross(force);
+        Ok(())
+    }
+
+    /// A particle or rigid body.
+    fn simple_body(&self, id: BodyId) -> Result<BodyId, SimError> {
+        let body = self.bodies.get(id).ok_or(SimError::Gone { what: "the body" })?;
+        match body.figure {
+            None => Ok(id),
+            Some(_) => Err(SimError::Unusable { what: "this is for particles and rigid bodies alone" }),
+        }
+    }
+
+    /// The frame at a material point: where it is and how it moves. `None` where there is no such body or part.
+    pub fn frame(&self, id: BodyId, at: PartPoint) -> Option<Frame<f64>> {
+        let body = self.bodies.get(id)?;
+        let parts = body.figure.as_ref().map_or(1, |figure| figure.dof.parts());
+        (at.part < parts).then(|| body.frame(at, &self.state))
+    }
+
+    /// A body's positions and rates.
+    pub fn slice(&self, id: BodyId) -> Option<SliceView<'_>> {
+        let body = self.bodies.get(id)?;
+        let (q, v) = (self.state.q(body.slice), self.state.v(body.slice));
+        Some(SliceView { serial: body.serial, kind: body.kind, q, v })
+    }
+
+    /// Sets positions and rates of a body of a general kind; its contacts of the last tick are forgotten, and so is a
+    /// quarantine.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, numbers that are too many or too few, or a body that is gone.
+    pub fn set_slice(&mut self, id: BodyId, q: &[f64], v: &[f64]) -> Result<(), SimError> {
+        let body = self.bodies.get_mut(id).ok_or(SimError::Gone { what: "the body" })?;
+        let Some(figure) = &mut body.figure else {
+            return Err(SimError::Unusable { what: "particles and rigid bodies have set_pose and set_velocity" });
+        };
+        let lengths = (self.state.q(body.slice).len(), self.state.v(body.slice).len());
+        if (q.len(), v.len()) != lengths {
+            return Err(SimError::Unusable { what: "q and v must be as long as the body's" });
+        }
+        for (numbers, what) in [(q, "q"), (v, "v")] {
+            numbers.iter().try_for_each(|&x| require(x.abs() < LARGEST, what, x, "finite and below 1e9"))?;
+        }
+        figure.dof.check(q, v)?;
+        figure.change.fill(0.0);
+        body.quarantined = false;
+        self.state.q_mut(body.slice).copy_from_slice(q);
+        self.state.v_mut(body.slice).copy_from_slice(v);
+        for placed in self.placed.iter().filter(|placed| placed.body == id) {
+            self.detector.forget_contacts(placed.serial);
+        }
+        Ok(())
+    }
+
+    /// What steers a body of a general kind, as its kind orders it; none for other bodies.
+    pub fn controls(&self, id: BodyId) -> Option<&[f64]> {
+        Some(self.bodies.get(id)?.figure.as_ref().map_or(&[], |figure| &figure.controls))
+    }
+
+    /// Steers a body of a general kind from the coming tick on.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, numbers that are too many or too few, or a body that is gone.
+    pub fn set_controls(&mut self, id: BodyId, controls: &[f64]) -> Result<(), SimError> {
+        let body = self.bodies.get_mut(id).ok_or(SimError::Gone { what: "the body" })?;
+        let Some(figure) = body.figure.as_mut().filter(|figure| figure.controls.len() == controls.len()) else {
+            return Err(SimError::Unusable { what: "controls must be as many as the body has" });
+        };
+        if controls.iter().any(|x| x.is_nan()) {
+            return Err(SimError::Unusable { what: "a control is NaN" });
+        }
+        figure.dof.check_controls(controls, self.settings.dt)?;
+        figure.controls.copy_from_slice(controls);
+        Ok(())
+    }
+
+    /// Number of bodies.
+    pub fn body_count(&self) -> usize {
+        self.order.len()
+    }
+
+    /// All bodies, in order of serial.
+    pub fn bodies(&self) -> &[BodyId] {
+        &self.order
+    }
+
+    /// All slices of Q and Q', in order of serial.
+    pub fn slices(&self) -> impl Iterator<Item = SliceView<'_>> {
+        self.order.iter().filter_map(|&id| self.slice(id))
+    }
+
+    /// Hash over every bit of Q and Q'.
+    pub fn state_hash(&self) -> u64 {
+        self.state.hash()
+    }
+}
