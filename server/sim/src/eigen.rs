@@ -27,6 +27,12 @@ pub(crate) fn symmetric_eigen(m: DMat3) -> (DVec3, DMat3) {
     (DVec3::new(a[0][0], a[1][1], a[2][2]), DMat3::from_cols(vectors[0], vectors[1], vectors[2]))
 }
 
+/// A symmetric matrix without its negative eigenvalues.
+pub(crate) fn positive_part(m: DMat3) -> DMat3 {
+    let (values, axes) = symmetric_eigen(m);
+    axes * DMat3::from_diagonal(values.max(DVec3::ZERO)) * axes.transpose()
+}
+
 /// Makes element (p, q) zero by a rotation in that plane (Golub and Van Loan, 8.5.2). `a[column][row]`, upper triangle.
 fn rotate(a: &mut [[f64; 3]; 3], vectors: &mut [DVec3; 3], p: usize, q: usize, other: usize) {
     let apq = a[q][p];

@@ -1,7 +1,7 @@
 //! Points of a body that is embedded in nodes: a place is Σ Nᵢ xᵢ, its axes turn as the polar decomposition of the
 //! deformation gradient F = Σ xᵢ ⊗ ∇Nᵢ does, F = R S.
 //!
-//! Shared by finite elements and lattices; knows neither.
+//! Shared by natural coordinates, finite elements and lattices; knows none of them.
 
 use glam::{DMat3, DVec3};
 
@@ -15,14 +15,14 @@ const LEAST_SUM: f64 = 0.1;
 
 /// A material point between N nodes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Embedding<const N: usize> {
+pub(super) struct EmbeddedPoint<const N: usize> {
     /// Nᵢ at the point; they sum up to 1.
     pub weights: [f64; N],
     /// ∇Nᵢ there in rest coordinates, 1/m; they sum up to 0.
     pub gradients: [DVec3; N],
 }
 
-impl<const N: usize> Embedding<N> {
+impl<const N: usize> EmbeddedPoint<N> {
     /// The frame at the point, with nodes at `x` that move at `v`.
     pub fn frame(&self, x: &[DVec3; N], v: &[DVec3; N]) -> Frame<f64> {
         let (rotation, turns) = self.turns(x);
@@ -85,7 +85,7 @@ mod tests {
             prop_assume!(s.y + s.z > 1.5 * LEAST_SUM);
             let [a, b, c] = weights;
             let gradients = [-DVec3::ONE, DVec3::X, DVec3::Y, DVec3::Z];
-            let point = Embedding { weights: [1.0 - a - b - c, a, b, c], gradients };
+            let point = EmbeddedPoint { weights: [1.0 - a - b - c, a, b, c], gradients };
             let Twist { linear, angular } = point.frame(&x, &v).twist();
             let step = 1e-6;
             let at = |h: f64| point.frame(&std::array::from_fn(|i| x[i] + h * v[i]), &v);

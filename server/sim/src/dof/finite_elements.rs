@@ -14,17 +14,14 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::embedding::Embedding;
-use super::interface::{BlockSize, Columns, Dof, Inertia, LocalState, PartPoint, PointMasses};
-use super::nodal::{SharedMass, Slot};
+use super::embedding::EmbeddedPoint;
+use super::interface::{BlockSize, Columns, Dof, Inertia, LocalState, PartPoint};
+use super::nodal::{Nodes, SharedMass, Slot, require_damping, viscosity};
 use super::{DofKind, Frame};
-use crate::error::{SimError, require};
+use crate::error::SimError;
 use crate::mass::{Density, tetrahedron_mass};
 use crate::mesh::TetrahedralMesh;
 use crate::potential::elasticity::{Curvature, Elastic, NODE_PAIRS, NodeBlocks, Tetrahedron};
-
-/// Longest time constant of damping, s.
-const DAMPING_MAX: f64 = 10.0;
 
 /// A body of tetrahedra.
 #[derive(Clone, Debug)]
@@ -33,15 +30,12 @@ pub struct FiniteElements {
     /// Time constant of the damping, s.
     damping: f64,
     elements: Vec<Element>,
-    /// Nodes of the mesh at rest: those that move first, then those that are fixed.
-    rest: Vec<DVec3>,
-    /// Place in `rest` of each node of the mesh.
+    nodes: Nodes,
+    /// Which of `nodes` each node of the mesh is.
     places: Vec<u32>,
-    masses: PointMasses,
-    blocks: Vec<BlockSize>,
 }
 
-/// An element; its nodes are places in `rest`.
+/// An element; its nodes are those of the body.
 #[derive(Clone, Copy, Debug)]
 struct Element {
     tetrahedron: Tetrahedron,
@@ -73,8 +67,7 @@ impl FiniteElements {
             Element { tetrahedron, slots }
         });
         let elements = elements.collect();
-        let blocks = vec![BlockSize { positions: 3, rates: 3 }; moving];
-        Ok(Self { material, damping: 0.0, elements, rest, places, masses, blocks })
+        Ok(Self { material, damping: 0.0, elements, nodes: Nodes::new(rest, masses), places })
     }
 
     /// The same with internal damping: stress grows by `seconds` times what the rate of strain would make as strain. A
@@ -83,7 +76,7 @@ impl FiniteElements {
     /// # Errors
     /// [`SimError::OutOfRange`] where it is negative or above 10 s.
     pub fn damped(self, seconds: f64) -> Result<Self, SimError> {
-        require((0.0..=DAMPING_MAX).contains(&seconds), "damping", seconds, "0 to 10 s")?;
+        require_damping(seconds)?;
         Ok(Self { damping: seconds, ..self })
     }
 
@@ -94,53 +87,33 @@ impl FiniteElements {
 
     /// Q at rest, the mesh turned about its frame's origin and then moved. Fixed nodes stay where they are.
     pub fn placed(&self, position: DVec3, rotation: DQuat) -> Vec<f64> {
-        self.rest[..self.blocks.len()].iter().flat_map(|&node| (position + rotation * node).to_array()).collect()
+        self.nodes.placed(position, rotation)
     }
 
     /// Q' at rest.
     pub fn still(&self) -> Vec<f64> {
-        vec![0.0; 3 * self.blocks.len()]
+        self.nodes.still()
     }
 
     /// Which point of Q a node of the mesh is; `None` where it is fixed, or there is none.
     pub fn point_of_node(&self, node: u32) -> Option<usize> {
-        self.places.get(node as usize).map(|&place| place as usize).filter(|&place| place < self.blocks.len())
+        self.places.get(node as usize).filter(|&&place| self.nodes.moves(place)).map(|&place| place as usize)
     }
 
     /// A node of the mesh as a material point: where to put a collider, or a joint. `None` where there is no such node.
     pub fn at_node(&self, node: u32) -> Option<PartPoint> {
         let place = *self.places.get(node as usize)?;
         let part = self.elements.iter().position(|element| element.tetrahedron.nodes.contains(&place))?;
-        Some(PartPoint { part: part as u32, point: self.rest[place as usize] })
+        Some(PartPoint { part: part as u32, point: self.nodes.rest[place as usize] })
     }
 
-    /// Places or rates of an element's nodes; `fixed` says them for nodes that are no DOF.
-    fn corners(&self, element: &Element, numbers: &[f64], fixed: impl Fn(usize) -> DVec3) -> [DVec3; 4] {
-        let moving = self.blocks.len();
-        element.tetrahedron.nodes.map(|node| {
-            let node = node as usize;
-            if node < moving { DVec3::from_slice(&numbers[3 * node..]) } else { fixed(node) }
-        })
-    }
-
-    fn positions(&self, element: &Element, q: &[f64]) -> [DVec3; 4] {
-        self.corners(element, q, |node| self.rest[node])
-    }
-
-    fn embedding(&self, at: PartPoint) -> (&Element, Embedding<4>) {
-        let element = &self.elements[at.part as usize];
-        let first = self.rest[element.tetrahedron.nodes[0] as usize];
-        let gradients = element.tetrahedron.gradients();
+    fn embedded(&self, at: PartPoint) -> ([u32; 4], EmbeddedPoint<4>) {
+        let tetrahedron = &self.elements[at.part as usize].tetrahedron;
+        let first = self.nodes.rest[tetrahedron.nodes[0] as usize];
+        let gradients = tetrahedron.gradients();
         let mut weights = gradients.map(|g| g.dot(at.point - first));
         weights[0] += 1.0;
-        (element, Embedding { weights, gradients })
-    }
-
-    /// The material of the damping in a tick of `dt`.
-    fn viscosity(&self, dt: f64) -> Option<Elastic> {
-        let Elastic { lambda, mu } = self.material;
-        let factor = self.damping / dt;
-        (factor > 0.0).then_some(Elastic { lambda: factor * lambda, mu: factor * mu })
+        (tetrahedron.nodes, EmbeddedPoint { weights, gradients })
     }
 }
 
@@ -150,7 +123,7 @@ impl Dof for FiniteElements {
     }
 
     fn blocks(&self) -> &[BlockSize] {
-        &self.blocks
+        &self.nodes.blocks
     }
 
     fn parts(&self) -> u32 {
@@ -158,58 +131,47 @@ impl Dof for FiniteElements {
     }
 
     fn frame(&self, at: PartPoint, q: &[f64], v: &[f64]) -> Frame<f64> {
-        let (element, embedding) = self.embedding(at);
-        embedding.frame(&self.positions(element, q), &self.corners(element, v, |_| DVec3::ZERO))
+        let (nodes, point) = self.embedded(at);
+        self.nodes.frame(nodes, &point, [q, v])
     }
 
     fn jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns)) {
-        let (element, embedding) = self.embedding(at);
-        let columns = embedding.columns(&self.positions(element, q));
-        for (columns, &node) in columns.iter().zip(&element.tetrahedron.nodes) {
-            if (node as usize) < self.blocks.len() {
-                visit(node as usize, columns);
-            }
-        }
+        let (nodes, point) = self.embedded(at);
+        self.nodes.jacobian(nodes, &point, q, visit);
     }
 
     fn inertia(&self) -> Inertia<'_> {
-        Inertia::Points(&self.masses)
+        Inertia::Points(&self.nodes.masses)
     }
 
     fn energy(&self, at: &LocalState, gradient: &mut [f64]) -> f64 {
-        let viscosity = self.viscosity(at.dt);
+        let viscosity = viscosity(self.material, self.damping, at.dt);
         let mut energy = 0.0;
-        for element in &self.elements {
-            let x = self.positions(element, at.q1);
-            let (stored, mut forces) = element.tetrahedron.energy_and_gradient(&self.material, x);
+        for Element { tetrahedron, .. } in &self.elements {
+            let [before, now] = [at.q0, at.q1].map(|q| self.nodes.places(tetrahedron.nodes, q));
+            let (stored, mut slopes) = tetrahedron.energy_and_gradient(&self.material, now);
             energy += stored;
             if let Some(viscosity) = &viscosity {
-                let before = self.positions(element, at.q0);
-                let (lost, drag) = element.tetrahedron.damping_and_gradient(viscosity, before, x);
+                let (lost, drag) = tetrahedron.damping_and_gradient(viscosity, before, now);
                 energy += lost;
-                forces.iter_mut().zip(drag).for_each(|(force, drag)| *force += drag);
+                slopes.iter_mut().zip(drag).for_each(|(slope, drag)| *slope += drag);
             }
-            for (force, &node) in forces.iter().zip(&element.tetrahedron.nodes) {
-                if let Some(entry) = gradient.get_mut(3 * node as usize..3 * node as usize + 3) {
-                    entry.iter_mut().zip(force.to_array()).for_each(|(entry, force)| *entry += force);
-                }
-            }
+            self.nodes.add_gradient(tetrahedron.nodes, slopes, gradient);
         }
         energy
     }
 
     fn point_stiffness(&self, at: &LocalState, own: &mut [DMat3], pairs: &mut [DMat3]) {
         let curvature = if at.definite { Curvature::Definite } else { Curvature::Natural };
-        let viscosity = self.viscosity(at.dt);
-        for element in &self.elements {
-            let x = self.positions(element, at.q1);
+        let viscosity = viscosity(self.material, self.damping, at.dt);
+        for Element { tetrahedron, slots } in &self.elements {
+            let [before, now] = [at.q0, at.q1].map(|q| self.nodes.places(tetrahedron.nodes, q));
             let mut add = |blocks: NodeBlocks| {
-                element.slots.iter().zip(blocks).for_each(|(slot, block)| slot.add(block, own, pairs));
+                slots.iter().zip(blocks).for_each(|(slot, block)| slot.add(block, own, pairs));
             };
-            add(element.tetrahedron.stiffness(&self.material, x, curvature));
+            add(tetrahedron.stiffness(&self.material, now, curvature));
             if let Some(viscosity) = &viscosity {
-                let before = self.positions(element, at.q0);
-                add(element.tetrahedron.damping_stiffness(viscosity, before, x, curvature));
+                add(tetrahedron.damping_stiffness(viscosity, before, now, curvature));
             }
         }
     }

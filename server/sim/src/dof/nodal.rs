@@ -1,12 +1,104 @@
-//! What elements that share nodes have in common: their mass matrix, and where their stiffness goes in it.
+//! What elements that share nodes have in common: where the nodes are, their mass matrix, where stiffness goes in it, and
+//! the material.
 //!
 //! Shared by finite elements and lattices; knows neither.
 
 use std::collections::BTreeMap;
 
-use glam::DMat3;
+use glam::{DMat3, DQuat, DVec3};
 
-use super::interface::PointMasses;
+use super::Frame;
+use super::embedding::EmbeddedPoint;
+use super::interface::{BlockSize, Columns, PointMasses};
+use crate::error::{SimError, require};
+use crate::potential::elasticity::Elastic;
+
+/// Longest time constant of damping, s.
+const DAMPING_MAX: f64 = 10.0;
+
+/// Nodes of a body of elements.
+#[derive(Clone, Debug)]
+pub(super) struct Nodes {
+    /// Places at rest, m: of those that move first, then of those that are fixed.
+    pub rest: Vec<DVec3>,
+    /// Of those that move.
+    pub masses: PointMasses,
+    /// Of those that move.
+    pub blocks: Vec<BlockSize>,
+}
+
+impl Nodes {
+    /// Nodes with the mass matrix of those that move.
+    pub fn new(rest: Vec<DVec3>, masses: PointMasses) -> Self {
+        let blocks = vec![BlockSize { positions: 3, rates: 3 }; masses.diagonal.len()];
+        Self { rest, masses, blocks }
+    }
+
+    /// Q at rest, turned about the origin and then moved.
+    pub fn placed(&self, position: DVec3, rotation: DQuat) -> Vec<f64> {
+        let moving = &self.rest[..self.blocks.len()];
+        moving.iter().flat_map(|&node| (position + rotation * node).to_array()).collect()
+    }
+
+    /// Q' at rest.
+    pub fn still(&self) -> Vec<f64> {
+        vec![0.0; 3 * self.blocks.len()]
+    }
+
+    /// Whether a node is one of those that move.
+    pub fn moves(&self, node: u32) -> bool {
+        (node as usize) < self.blocks.len()
+    }
+
+    /// Places of an element's nodes.
+    pub fn places<const N: usize>(&self, nodes: [u32; N], q: &[f64]) -> [DVec3; N] {
+        nodes.map(|node| if self.moves(node) { numbers_of(node, q) } else { self.rest[node as usize] })
+    }
+
+    /// The frame at a point of an element.
+    pub fn frame<const N: usize>(&self, nodes: [u32; N], point: &EmbeddedPoint<N>, [q, v]: [&[f64]; 2]) -> Frame<f64> {
+        let velocities = nodes.map(|node| if self.moves(node) { numbers_of(node, v) } else { DVec3::ZERO });
+        point.frame(&self.places(nodes, q), &velocities)
+    }
+
+    /// Hands `visit` the nodes of an element that move, with the derivatives of the frame at a point of it.
+    pub fn jacobian<const N: usize>(
+        &self,
+        nodes: [u32; N],
+        point: &EmbeddedPoint<N>,
+        q: &[f64],
+        visit: &mut dyn FnMut(usize, &Columns),
+    ) {
+        let columns = point.columns(&self.places(nodes, q));
+        for (columns, node) in columns.iter().zip(nodes).filter(|&(_, node)| self.moves(node)) {
+            visit(node as usize, columns);
+        }
+    }
+
+    /// Adds what an element's energy has as a gradient at its nodes.
+    pub fn add_gradient<const N: usize>(&self, nodes: [u32; N], of_nodes: [DVec3; N], gradient: &mut [f64]) {
+        for (of_node, node) in of_nodes.into_iter().zip(nodes).filter(|&(_, node)| self.moves(node)) {
+            let entry = &mut gradient[3 * node as usize..][..3];
+            entry.iter_mut().zip(of_node.to_array()).for_each(|(entry, slope)| *entry += slope);
+        }
+    }
+}
+
+fn numbers_of(node: u32, numbers: &[f64]) -> DVec3 {
+    DVec3::from_slice(&numbers[3 * node as usize..])
+}
+
+/// `Err` unless a time constant of damping, s, is one that can be had.
+pub(super) fn require_damping(seconds: f64) -> Result<(), SimError> {
+    require((0.0..=DAMPING_MAX).contains(&seconds), "damping", seconds, "0 to 10 s")
+}
+
+/// The material of the damping with a time constant of `seconds` in a tick of `dt`; `None` where there is none.
+pub(super) fn viscosity(material: Elastic, seconds: f64, dt: f64) -> Option<Elastic> {
+    let Elastic { lambda, mu } = material;
+    let factor = seconds / dt;
+    (factor > 0.0).then_some(Elastic { lambda: factor * lambda, mu: factor * mu })
+}
 
 /// A mass matrix that is being summed up. Nodes from its size on are fixed, and no part of it.
 pub(super) struct SharedMass {

@@ -10,7 +10,7 @@ use crate::potential::limit::AngleLimitTerm;
 use crate::potential::motor::MotorTerm;
 use crate::potential::rod::RodTerm;
 use crate::potential::slider::LineTerm;
-use crate::potential::universal_joint::UniversalJointTerm;
+use crate::potential::universal_joint::RightAngle;
 use crate::potential::{Driven, MotorDesc};
 
 impl Integrator {
@@ -29,8 +29,8 @@ impl Integrator {
             let scale = solve.scale(ends, solve.places(ends), least);
             let place = BallJointTerm::new(ends, desc.tolerance, scale, memory);
             let axes = [desc.axis_a.normalize(), desc.axis_b.normalize()];
-            let term = UniversalJointTerm::new(place, axes, desc.tilt, solve.turn_scale(ends, least), memory);
-            solve.problem.terms.universal_joints.push(term);
+            let turns = RightAngle::new(axes, desc.tilt, solve.turn_scale(ends, least), memory);
+            solve.problem.terms.universal_joints.push(Aligned { place, turns });
             solve.universal_joints.push(id);
         }
         for (id, &Held { desc: Captured { desc, axes }, memory }) in &scene.potentials.fixed_joints {

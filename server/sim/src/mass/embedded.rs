@@ -170,7 +170,7 @@ pub(super) fn for_each_gauss_point([a, b, c, d]: [DVec3; 4], mut visit: impl FnM
 }
 
 /// Weights of the corners of the unit box at a place in it.
-fn trilinear(u: DVec3) -> [f64; 8] {
+pub(crate) fn trilinear(u: DVec3) -> [f64; 8] {
     let along = |corner: usize, bit: usize, x: f64| if corner & bit == 0 { 1.0 - x } else { x };
     std::array::from_fn(|i| along(i, 1, u.x) * along(i, 2, u.y) * along(i, 4, u.z))
 }

@@ -17,6 +17,7 @@ mod tests;
 
 use glam::{DMat3, DQuat, DVec3};
 
+pub(crate) use embedded::trilinear;
 pub use embedded::{embedded_mass, lattice_cell_mass, tetrahedron_mass};
 pub use polyhedron::Polyhedron;
 

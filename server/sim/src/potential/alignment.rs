@@ -1,5 +1,6 @@
-//! Alignment: directions of two frames held together by a penalty whose stiffness the engine chooses. With the place of a
-//! joint beside it, it makes a hinge (one direction), a fixed joint or a slider (three).
+//! Alignment: turns of two frames against each other, held by a penalty whose stiffness the engine chooses. With the place
+//! of a joint beside it, it makes a hinge (one direction that the frames have in common), a fixed joint or a slider
+//! (three), or a universal joint (two directions at right angles).
 
 use glam::{DMat3, DVec3};
 
@@ -44,15 +45,33 @@ impl<const N: usize> Alignment<N> {
     fn directions<S: Scalar>(&self, at: [&Frame<S>; 2]) -> [[Vec3<S>; 2]; N] {
         self.axes.map(|[a, b]| [at[0].arm(a), at[1].arm(b)])
     }
+}
 
-    /// Turn that is left between the frames, rad.
+/// A potential of the turn between two frames that holds it to a tolerance, rad.
+pub(crate) trait Turns {
+    /// Turn that should not be, rad.
+    fn tilt(&self, at: [&Frame<f64>; 2]) -> f64;
+
+    /// Energy, and its gradient with respect to turns of the second frame; the first has the opposite.
+    fn evaluate<S: Scalar>(&self, at: [&Frame<S>; 2]) -> (S, Vec3<S>);
+
+    /// Positive semidefinite second derivative, N m.
+    fn stiffness(&self, at: [&Frame<f64>; 2]) -> DMat3;
+
+    /// Its stiffness and tolerance.
+    fn hold(&self) -> &Hold;
+
+    /// To be stiffened.
+    fn hold_mut(&mut self) -> &mut Hold;
+}
+
+impl<const N: usize> Turns for Alignment<N> {
     fn tilt(&self, at: [&Frame<f64>; 2]) -> f64 {
         let squared = |[a, b]: [Vec3<f64>; 2]| (a - b).dot(a - b);
         let chord = (Self::WEIGHT * self.directions(at).map(squared).iter().sum::<f64>()).sqrt();
         2.0 * (chord / 2.0).min(1.0).asin()
     }
 
-    /// Energy, and its gradient with respect to turns of the second frame; the first has the opposite.
     fn evaluate<S: Scalar>(&self, at: [&Frame<S>; 2]) -> (S, Vec3<S>) {
         let (mut energy, mut torque) = (S::ZERO, Vec3::ZERO);
         for [a, b] in self.directions(at) {
@@ -73,16 +92,24 @@ impl<const N: usize> Alignment<N> {
         let sum = self.directions(at).map(across).into_iter().fold(DMat3::ZERO, |sum, k| sum + k);
         sum * (Self::WEIGHT * self.hold.stiffness)
     }
+
+    fn hold(&self) -> &Hold {
+        &self.hold
+    }
+
+    fn hold_mut(&mut self) -> &mut Hold {
+        &mut self.hold
+    }
 }
 
-/// A joint that holds its points by `place` and its turns by an alignment.
+/// A joint that holds its points by `place` and its turns by `turns`.
 #[derive(Clone, Debug)]
-pub(crate) struct Aligned<Place, const N: usize> {
+pub(crate) struct Aligned<Place, T> {
     pub place: Place,
-    pub turns: Alignment<N>,
+    pub turns: T,
 }
 
-impl<Place: Joint, const N: usize> Joint for Aligned<Place, N> {
+impl<Place: Joint, T: Turns> Joint for Aligned<Place, T> {
     fn gap(&self, at: [&Frame<f64>; 2]) -> f64 {
         self.place.gap(at)
     }
@@ -92,15 +119,15 @@ impl<Place: Joint, const N: usize> Joint for Aligned<Place, N> {
     }
 
     fn is_open(&self, at: [&Frame<f64>; 2]) -> bool {
-        self.place.is_open(at) || self.turns.hold.is_open(self.tilt(at))
+        self.place.is_open(at) || self.turns.hold().is_open(self.tilt(at))
     }
 
     fn remember(&self, at: [&Frame<f64>; 2]) -> Memory {
-        Memory { turn_stiffening: self.turns.hold.remember(self.tilt(at)), ..self.place.remember(at) }
+        Memory { turn_stiffening: self.turns.hold().remember(self.tilt(at)), ..self.place.remember(at) }
     }
 }
 
-impl<Place: Joint, const N: usize> Term for Aligned<Place, N> {
+impl<Place: Joint, T: Turns> Term for Aligned<Place, T> {
     const BENDS: bool = Place::BENDS;
 
     fn frames(&self) -> [FrameIndex; 2] {
@@ -131,6 +158,6 @@ impl<Place: Joint, const N: usize> Term for Aligned<Place, N> {
     fn stiffen(&mut self, at: [&Frame<f64>; 2]) -> bool {
         let tilt = self.tilt(at);
         // Both, whatever the first answers.
-        self.place.stiffen(at) | self.turns.hold.stiffen(tilt)
+        self.place.stiffen(at) | self.turns.hold_mut().stiffen(tilt)
     }
 }

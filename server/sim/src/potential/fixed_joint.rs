@@ -1,7 +1,7 @@
 //! Fixed joint: two points and all turns held together, as if welded.
 
 use super::Anchor;
-use super::alignment::{Aligned, TILT, require_tilt};
+use super::alignment::{Aligned, Alignment, TILT, require_tilt};
 use super::ball_joint::BallJointTerm;
 use super::hold::{TOLERANCE, require_tolerance};
 use crate::error::{SimError, require_vector};
@@ -40,4 +40,4 @@ impl FixedJointDesc {
 }
 
 /// A fixed joint in an island.
-pub(crate) type FixedJointTerm = Aligned<BallJointTerm, 3>;
+pub(crate) type FixedJointTerm = Aligned<BallJointTerm, Alignment<3>>;

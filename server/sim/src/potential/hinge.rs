@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::Anchor;
-use super::alignment::{Aligned, TILT, require_tilt};
+use super::alignment::{Aligned, Alignment, TILT, require_tilt};
 use super::ball_joint::BallJointTerm;
 use super::hold::{TOLERANCE, require_tolerance};
 use crate::error::{SimError, require_direction, require_vector};
@@ -49,4 +49,4 @@ impl HingeDesc {
 }
 
 /// A hinge in an island.
-pub(crate) type HingeTerm = Aligned<BallJointTerm, 1>;
+pub(crate) type HingeTerm = Aligned<BallJointTerm, Alignment<1>>;

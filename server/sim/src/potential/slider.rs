@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::alignment::{Aligned, TILT, require_tilt};
+use super::alignment::{Aligned, Alignment, TILT, require_tilt};
 use super::hold::{Hold, Joint, Memory, Scale, TOLERANCE, require_tolerance};
 use super::{Anchor, End, FrameIndex, PairBlocks, Term, Wrench, geometric_stiffness, outer};
 use crate::autodiff::{Scalar, Vec3};
@@ -46,7 +46,7 @@ impl SliderDesc {
 }
 
 /// A slider in an island.
-pub(crate) type SliderTerm = Aligned<LineTerm, 3>;
+pub(crate) type SliderTerm = Aligned<LineTerm, Alignment<3>>;
 
 /// A point held on a line: energy ½ k |what it is off the line|².
 #[derive(Clone, Debug)]

@@ -14,7 +14,7 @@ use super::pd::PdTerm;
 use super::rod::RodTerm;
 use super::slider::LineTerm;
 use super::spring::SpringTerm;
-use super::universal_joint::UniversalJointTerm;
+use super::universal_joint::RightAngle;
 use super::*;
 use crate::autodiff::Dual;
 use crate::collide::ContactPoint;
@@ -281,7 +281,7 @@ proptest! {
     #[test]
     fn universal_joint_derives(a in vector(), b in vector(), x in direction(), y in direction(), t in frame(), u in frame()) {
         let place = BallJointTerm::new(ends(a, b), 1e-3, SCALE, Memory::default());
-        let term = UniversalJointTerm::new(place, [x, y], 1e-3, SCALE, Memory::default());
+        let term = Aligned { place, turns: RightAngle::new([x, y], 1e-3, SCALE, Memory::default()) };
         check_gradient(&term, &[t, u]);
         automatic_hessian(&term, &[t, u], 1e-5);
     }
@@ -291,7 +291,7 @@ proptest! {
         u.position = t.position + t.arm(a) - u.arm(b);
         let across = u.rotation.transposed_multiply(t.arm(x.any_orthonormal_vector())).into();
         let place = BallJointTerm::new(ends(a, b), 1e-3, SCALE, Memory::default());
-        let mut term = UniversalJointTerm::new(place, [x, across], 1e-3, SCALE, Memory::default());
+        let mut term = Aligned { place, turns: RightAngle::new([x, across], 1e-3, SCALE, Memory::default()) };
         term.relinearise(DT, [&t, &u]);
         check_hessian(&term, &[t, u], 1e-5);
     }

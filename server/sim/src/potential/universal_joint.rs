@@ -1,15 +1,15 @@
 //! Universal joint: two points held together, and an axis of each body at right angles to one of the other. The turns
 //! about both axes are free.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
-use super::alignment::TILT;
+use super::alignment::{Aligned, TILT, Turns};
 use super::ball_joint::BallJointTerm;
 use super::hinge::HingeDesc;
-use super::hold::{Hold, Joint, Memory, Scale, TOLERANCE};
-use super::{Anchor, FrameIndex, PairBlocks, Term, Wrench, outer};
+use super::hold::{Hold, Memory, Scale, TOLERANCE};
+use super::{Anchor, outer};
 use crate::autodiff::{Scalar, Vec3};
-use crate::dof::{Frame, Twist};
+use crate::dof::Frame;
 use crate::error::SimError;
 
 slotmap::new_key_type! {
@@ -47,19 +47,21 @@ impl UniversalJointDesc {
     }
 }
 
-/// A universal joint in an island: a ball joint, and energy ½ k (a · b)².
+/// A universal joint in an island.
+pub(crate) type UniversalJointTerm = Aligned<BallJointTerm, RightAngle>;
+
+/// Two directions held at right angles: energy ½ k (a · b)².
 #[derive(Clone, Debug)]
-pub(crate) struct UniversalJointTerm {
-    place: BallJointTerm,
+pub(crate) struct RightAngle {
     /// Unit vectors in the first and in the second frame.
     axes: [DVec3; 2],
     hold: Hold,
 }
 
-impl UniversalJointTerm {
+impl RightAngle {
     /// `axes` are unit vectors; `tilt` is the tolerance, rad.
-    pub fn new(place: BallJointTerm, axes: [DVec3; 2], tilt: f64, scale: Scale, memory: Memory) -> Self {
-        Self { place, axes, hold: Hold::new(scale, tilt, memory.turn_stiffening) }
+    pub fn new(axes: [DVec3; 2], tilt: f64, scale: Scale, memory: Memory) -> Self {
+        Self { axes, hold: Hold::new(scale, tilt, memory.turn_stiffening) }
     }
 
     /// Cosine of the angle between the axes, and its derivative with respect to turns of the second frame.
@@ -69,58 +71,27 @@ impl UniversalJointTerm {
     }
 }
 
-impl Joint for UniversalJointTerm {
-    fn gap(&self, at: [&Frame<f64>; 2]) -> f64 {
-        self.place.gap(at)
-    }
-
+impl Turns for RightAngle {
     fn tilt(&self, at: [&Frame<f64>; 2]) -> f64 {
         self.cosine(at).0.abs().min(1.0).asin()
     }
 
-    fn is_open(&self, at: [&Frame<f64>; 2]) -> bool {
-        self.place.is_open(at) || self.hold.is_open(self.tilt(at))
-    }
-
-    fn remember(&self, at: [&Frame<f64>; 2]) -> Memory {
-        Memory { turn_stiffening: self.hold.remember(self.tilt(at)), ..self.place.remember(at) }
-    }
-}
-
-impl Term for UniversalJointTerm {
-    const BENDS: bool = BallJointTerm::BENDS;
-
-    fn frames(&self) -> [FrameIndex; 2] {
-        self.place.frames()
-    }
-
-    fn evaluate<S: Scalar>(&self, dt: f64, at: [&Frame<S>; 2]) -> (S, [Wrench<S>; 2]) {
-        let (energy, [a, b]) = self.place.evaluate(dt, at);
+    fn evaluate<S: Scalar>(&self, at: [&Frame<S>; 2]) -> (S, Vec3<S>) {
         let (cosine, slope) = self.cosine(at);
         let pull = cosine * self.hold.stiffness;
-        let torque = slope.scale(pull);
-        let wrenches = [Wrench { torque: a.torque - torque, ..a }, Wrench { torque: b.torque + torque, ..b }];
-        (energy + cosine * pull * 0.5, wrenches)
+        (cosine * pull * 0.5, slope.scale(pull))
     }
 
-    fn hessian(&self, dt: f64, at: [&Frame<f64>; 2]) -> PairBlocks {
-        let mut blocks = self.place.hessian(dt, at);
+    fn stiffness(&self, at: [&Frame<f64>; 2]) -> DMat3 {
         let slope = DVec3::from(self.cosine(at).1);
-        blocks.add_rotation(outer(slope, slope) * self.hold.stiffness);
-        blocks
+        outer(slope, slope) * self.hold.stiffness
     }
 
-    fn relinearise(&mut self, dt: f64, at: [&Frame<f64>; 2]) {
-        self.place.relinearise(dt, at);
+    fn hold(&self) -> &Hold {
+        &self.hold
     }
 
-    fn propose(&mut self, step: [Twist; 2]) {
-        self.place.propose(step);
-    }
-
-    fn stiffen(&mut self, at: [&Frame<f64>; 2]) -> bool {
-        let tilt = self.tilt(at);
-        // Both, whatever the first answers.
-        self.place.stiffen(at) | self.hold.stiffen(tilt)
+    fn hold_mut(&mut self) -> &mut Hold {
+        &mut self.hold
     }
 }

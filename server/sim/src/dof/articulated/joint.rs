@@ -48,17 +48,8 @@ impl JointKind {
         Some(BlockSize { positions, rates })
     }
 
-    /// Where its unit quaternion starts among its positions.
+    /// Where its unit quaternion starts among its positions, and the rate of that among its rates.
     pub(super) fn quaternion(self) -> Option<usize> {
-        match self {
-            Self::Ball => Some(0),
-            Self::Free => Some(3),
-            _ => None,
-        }
-    }
-
-    /// Where its rates of turning in any way start.
-    fn spin(self) -> Option<usize> {
         match self {
             Self::Ball => Some(0),
             Self::Free => Some(3),
@@ -79,8 +70,8 @@ impl JointKind {
         for ((q1, q0), v) in q1.iter_mut().zip(q0).zip(v) {
             *q1 = q0 + dt * v;
         }
-        if let (Some(start), Some(spin)) = (self.quaternion(), self.spin()) {
-            let turn = DQuat::from_scaled_axis(dt * DVec3::from_slice(&v[spin..]));
+        if let Some(start) = self.quaternion() {
+            let turn = DQuat::from_scaled_axis(dt * DVec3::from_slice(&v[start..]));
             let turned = (turn * DQuat::from_slice(&q0[start..])).normalize();
             q1[start..start + 4].copy_from_slice(&turned.to_array());
         }

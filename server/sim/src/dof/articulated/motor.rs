@@ -4,8 +4,9 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::joint::JointKind;
 use super::turning::{Turning, differentiate};
-use super::well::{Well, positive_part};
+use super::well::Well;
 use crate::autodiff::{Scalar, Vec3};
+use crate::eigen::positive_part;
 use crate::error::{LARGEST, SimError, require, require_rotation};
 use crate::potential::PdGains;
 

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::eigen::symmetric_eigen;
+use crate::eigen::positive_part;
 
 /// Energy of a joint of one to three rates, with its derivatives with respect to their displacements. What a joint does
 /// not have stays zero.
@@ -32,10 +32,4 @@ impl Well {
         self.gradient += direction * slope;
         self.hessian += crate::potential::outer(direction, direction) * curvature;
     }
-}
-
-/// Of a symmetric matrix.
-pub(super) fn positive_part(m: DMat3) -> DMat3 {
-    let (values, axes) = symmetric_eigen(m);
-    axes * DMat3::from_diagonal(values.max(DVec3::ZERO)) * axes.transpose()
 }

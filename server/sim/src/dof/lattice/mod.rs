@@ -22,19 +22,16 @@ use glam::{DMat3, DQuat, DVec3};
 
 pub use rest_shape::RestShape;
 
-use super::embedding::Embedding;
+use super::embedding::EmbeddedPoint;
 use super::interface::{BlockSize, Columns, Dof, Inertia, LocalState, PartPoint, PointMasses};
-use super::nodal::{SharedMass, Slot};
+use super::nodal::{Nodes, SharedMass, Slot, require_damping, viscosity};
 use super::{DofKind, Frame};
 use crate::error::{SimError, require, require_vector};
-use crate::mass::{Density, Polyhedron, lattice_cell_mass};
+use crate::mass::{Density, Polyhedron, lattice_cell_mass, trilinear};
 use crate::potential::elasticity::{Curvature, Elastic, Tangent};
 
 /// Most cells of a lattice.
 const CELLS_MAX: usize = 4096;
-
-/// Longest time constant of damping, s.
-const DAMPING_MAX: f64 = 10.0;
 
 /// A cell is left out where the solid weighs less than this share of what would fill it: its nodes would be too light to
 /// be held by anything.
@@ -48,6 +45,9 @@ const CORNERS: usize = 8;
 
 /// Numbers of a Gauss point among what is prepared: its volume, m³, and the gradients of eight shape functions, 1/m.
 const GAUSS_NUMBERS: usize = 1 + 3 * CORNERS;
+
+/// Mass matrix of a cell over its corners, kg.
+type CellMass = [[f64; CORNERS]; CORNERS];
 
 /// How a body is embedded.
 #[derive(Clone, Debug)]
@@ -75,10 +75,7 @@ pub struct Lattice {
     cells: Vec<Cell>,
     /// Part of each cell of the whole lattice; none where the solid has nothing there.
     parts: Vec<Option<u32>>,
-    /// Nodes at rest.
-    rest: Vec<DVec3>,
-    masses: PointMasses,
-    blocks: Vec<BlockSize>,
+    nodes: Nodes,
 }
 
 /// A cell with something in it.
@@ -102,38 +99,30 @@ impl Lattice {
     pub fn new(solid: &Polyhedron, desc: LatticeDesc) -> Result<Self, SimError> {
         desc.validate()?;
         let size = (desc.max - desc.min) / desc.cell_counts();
-        let mut lattice = Self {
-            desc,
-            size,
-            cells: vec![],
-            parts: vec![],
-            rest: vec![],
-            masses: PointMasses::new(0),
-            blocks: vec![],
-        };
-        let masses = lattice.fill(solid)?;
-        let mut shared = SharedMass::new(lattice.rest.len());
+        let nodes = Nodes::new(vec![], PointMasses::default());
+        let mut lattice = Self { desc, size, cells: vec![], parts: vec![], nodes };
+        let (rest, masses) = lattice.fill(solid)?;
+        let mut shared = SharedMass::new(rest.len());
         lattice.cells.iter().zip(&masses).for_each(|(cell, mass)| shared.add(cell.nodes, mass));
-        lattice.masses = shared.finish();
+        lattice.nodes = Nodes::new(rest, shared.finish());
         let whole = solid.mass_properties(lattice.desc.density)?.mass;
-        let inside = lattice.masses.total() > (1.0 - SLIVERS) * whole;
+        let inside = lattice.nodes.masses.total() > (1.0 - SLIVERS) * whole;
         if !inside {
             return Err(SimError::Unusable { what: "the solid does not lie inside the lattice" });
         }
         for cell in &mut lattice.cells {
-            let pairs = pairs().map(|(i, j)| Slot::between(&lattice.masses, cell.nodes[i], cell.nodes[j]));
+            let pairs = pairs().map(|(i, j)| Slot::between(&lattice.nodes.masses, cell.nodes[i], cell.nodes[j]));
             cell.slots.iter_mut().zip(pairs).for_each(|(slot, found)| *slot = found);
         }
-        lattice.blocks = vec![BlockSize { positions: 3, rates: 3 }; lattice.rest.len()];
         Ok(lattice)
     }
 
-    /// Finds the cells that have something in them, and their nodes. Answers their mass matrices.
-    fn fill(&mut self, solid: &Polyhedron) -> Result<Vec<[[f64; CORNERS]; CORNERS]>, SimError> {
+    /// Finds the cells that have something in them. Answers the places of their nodes, and their mass matrices.
+    fn fill(&mut self, solid: &Polyhedron) -> Result<(Vec<DVec3>, Vec<CellMass>), SimError> {
         let [nx, ny, nz] = self.desc.cells;
         let counts = [nx + 1, ny + 1, nz + 1].map(|n| n as usize);
         let mut numbers = vec![None; counts.iter().product()];
-        let mut masses = Vec::new();
+        let (mut rest, mut masses) = (Vec::new(), Vec::new());
         for (i, j, k) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (i, j, k)))) {
             let at = |corner: u32| {
                 DVec3::new(f64::from(i + (corner & 1)), f64::from(j + (corner >> 1 & 1)), f64::from(k + (corner >> 2)))
@@ -151,8 +140,8 @@ impl Lattice {
                 let whole = at(corner as u32).as_uvec3();
                 let number = whole.x as usize + counts[0] * (whole.y as usize + counts[1] * whole.z as usize);
                 *numbers[number].get_or_insert_with(|| {
-                    self.rest.push(place(corner as u32));
-                    self.rest.len() as u32 - 1
+                    rest.push(place(corner as u32));
+                    rest.len() as u32 - 1
                 })
             });
             self.cells.push(Cell { nodes, min: place(0), filled, slots: [Slot::Nowhere; 36] });
@@ -161,7 +150,7 @@ impl Lattice {
         if self.cells.is_empty() {
             return Err(SimError::Unusable { what: "the solid does not lie inside the lattice" });
         }
-        Ok(masses)
+        Ok((rest, masses))
     }
 
     /// Q at rest.
@@ -171,12 +160,12 @@ impl Lattice {
 
     /// Q at rest, the body's frame turned about its origin and then moved.
     pub fn placed(&self, position: DVec3, rotation: DQuat) -> Vec<f64> {
-        self.rest.iter().flat_map(|&node| (position + rotation * node).to_array()).collect()
+        self.nodes.placed(position, rotation)
     }
 
     /// Q' at rest.
     pub fn still(&self) -> Vec<f64> {
-        vec![0.0; 3 * self.rest.len()]
+        self.nodes.still()
     }
 
     /// A point of the body's frame as a material point: where to put a collider, a joint or a vertex. `None` outside of
@@ -193,21 +182,11 @@ impl Lattice {
         Some(PartPoint { part, point })
     }
 
-    fn corners(&self, cell: &Cell, numbers: &[f64]) -> [DVec3; CORNERS] {
-        cell.nodes.map(|node| DVec3::from_slice(&numbers[3 * node as usize..]))
-    }
-
-    fn embedding(&self, at: PartPoint) -> (&Cell, Embedding<CORNERS>) {
+    fn embedded(&self, at: PartPoint) -> ([u32; CORNERS], EmbeddedPoint<CORNERS>) {
         let cell = &self.cells[at.part as usize];
-        let (weights, gradients) = trilinear((at.point - cell.min) / self.size);
-        (cell, Embedding { weights, gradients: gradients.map(|g| g / self.size) })
-    }
-
-    /// The material of the damping in a tick of `dt`.
-    fn viscosity(&self, dt: f64) -> Option<Elastic> {
-        let Elastic { lambda, mu } = self.desc.material;
-        let factor = self.desc.damping / dt;
-        (factor > 0.0).then_some(Elastic { lambda: factor * lambda, mu: factor * mu })
+        let place = (at.point - cell.min) / self.size;
+        let gradients = trilinear_gradients(place).map(|g| g / self.size);
+        (cell.nodes, EmbeddedPoint { weights: trilinear(place), gradients })
     }
 
     /// Appends volume and gradients of every Gauss point with the body's rest shape at `shape`. Answers whether no cell
@@ -215,11 +194,11 @@ impl Lattice {
     fn prepare_gauss_points(&self, shape: &RestShape, prepared: &mut Vec<f64>) -> bool {
         let middle = (self.desc.min + self.desc.max) / 2.0;
         let foot = DVec3::new(middle.x, self.desc.min.y, middle.z);
-        let rest: Vec<DVec3> = self.rest.iter().map(|&node| foot + shape.map(node - foot)).collect();
+        let rest: Vec<DVec3> = self.nodes.rest.iter().map(|&node| foot + shape.map(node - foot)).collect();
         let mut upright = true;
         for cell in &self.cells {
             for place in gauss_points() {
-                let (_, gradients) = trilinear(place);
+                let gradients = trilinear_gradients(place);
                 let column =
                     |k: usize| gradients.iter().zip(cell.nodes).map(|(g, node)| rest[node as usize] * g[k]).sum();
                 let jacobian = DMat3::from_cols(column(0), column(1), column(2));
@@ -247,7 +226,7 @@ impl LatticeDesc {
         let count = self.cell_counts().element_product();
         let some = self.cells.iter().all(|&n| n > 0) && count <= CELLS_MAX as f64;
         require(some, "cells of the lattice", count, "1 or more each way, 4096 or fewer")?;
-        require((0.0..=DAMPING_MAX).contains(&self.damping), "damping", self.damping, "0 to 10 s")
+        require_damping(self.damping)
     }
 }
 
@@ -270,7 +249,7 @@ impl Dof for Lattice {
     }
 
     fn blocks(&self) -> &[BlockSize] {
-        &self.blocks
+        &self.nodes.blocks
     }
 
     fn parts(&self) -> u32 {
@@ -278,18 +257,17 @@ impl Dof for Lattice {
     }
 
     fn frame(&self, at: PartPoint, q: &[f64], v: &[f64]) -> Frame<f64> {
-        let (cell, embedding) = self.embedding(at);
-        embedding.frame(&self.corners(cell, q), &self.corners(cell, v))
+        let (nodes, point) = self.embedded(at);
+        self.nodes.frame(nodes, &point, [q, v])
     }
 
     fn jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns)) {
-        let (cell, embedding) = self.embedding(at);
-        let columns = embedding.columns(&self.corners(cell, q));
-        cell.nodes.iter().zip(&columns).for_each(|(&node, columns)| visit(node as usize, columns));
+        let (nodes, point) = self.embedded(at);
+        self.nodes.jacobian(nodes, &point, q, visit);
     }
 
     fn inertia(&self) -> Inertia<'_> {
-        Inertia::Points(&self.masses)
+        Inertia::Points(&self.nodes.masses)
     }
 
     /// The numbers of a [`RestShape`].
@@ -312,10 +290,10 @@ impl Dof for Lattice {
     }
 
     fn energy(&self, at: &LocalState, gradient: &mut [f64]) -> f64 {
-        let viscosity = self.viscosity(at.dt);
+        let viscosity = viscosity(self.desc.material, self.desc.damping, at.dt);
         let mut energy = 0.0;
         for (index, cell) in self.cells.iter().enumerate() {
-            let [before, now] = [at.q0, at.q1].map(|q| self.corners(cell, q));
+            let [before, now] = [at.q0, at.q1].map(|q| self.nodes.places(cell.nodes, q));
             for (volume, gradients) in gauss_of(at.prepared, index) {
                 let f = deformation(&now, &gradients);
                 let (mut density, mut stress) = self.desc.material.guarded_energy_and_stress(f);
@@ -325,11 +303,7 @@ impl Dof for Lattice {
                     stress += drag;
                 }
                 energy += volume * density;
-                for (&node, g) in cell.nodes.iter().zip(gradients) {
-                    let force = stress * g * volume;
-                    let entry = &mut gradient[3 * node as usize..][..3];
-                    entry.iter_mut().zip(force.to_array()).for_each(|(entry, force)| *entry += force);
-                }
+                self.nodes.add_gradient(cell.nodes, gradients.map(|g| stress * g * volume), gradient);
             }
         }
         energy
@@ -337,9 +311,9 @@ impl Dof for Lattice {
 
     fn point_stiffness(&self, at: &LocalState, own: &mut [DMat3], pairs_of_nodes: &mut [DMat3]) {
         let curvature = if at.definite { Curvature::Definite } else { Curvature::Natural };
-        let viscosity = self.viscosity(at.dt);
+        let viscosity = viscosity(self.desc.material, self.desc.damping, at.dt);
         for (index, cell) in self.cells.iter().enumerate() {
-            let [before, now] = [at.q0, at.q1].map(|q| self.corners(cell, q));
+            let [before, now] = [at.q0, at.q1].map(|q| self.nodes.places(cell.nodes, q));
             let mut blocks = [DMat3::ZERO; CORNERS * (CORNERS + 1) / 2];
             for (volume, gradients) in gauss_of(at.prepared, index) {
                 let f = deformation(&now, &gradients);
@@ -370,17 +344,15 @@ fn gauss_points() -> impl Iterator<Item = DVec3> {
     (0..CORNERS).map(move |corner| DVec3::new(along(corner, 1), along(corner, 2), along(corner, 4)))
 }
 
-/// Weights of the corners of the unit box at a place in it, and their gradients.
-fn trilinear(place: DVec3) -> ([f64; CORNERS], [DVec3; CORNERS]) {
+/// Gradients of the weights of the unit box's corners at a place in it.
+fn trilinear_gradients(place: DVec3) -> [DVec3; CORNERS] {
     let along = |corner: usize, axis: usize| if corner >> axis & 1 == 0 { 1.0 - place[axis] } else { place[axis] };
     let slope = |corner: usize, axis: usize| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
-    let weight = |c: usize| along(c, 0) * along(c, 1) * along(c, 2);
-    let gradient = |c: usize| {
+    std::array::from_fn(|c| {
         DVec3::new(
             slope(c, 0) * along(c, 1) * along(c, 2),
             along(c, 0) * slope(c, 1) * along(c, 2),
             along(c, 0) * along(c, 1) * slope(c, 2),
         )
-    };
-    (std::array::from_fn(weight), std::array::from_fn(gradient))
+    })
 }

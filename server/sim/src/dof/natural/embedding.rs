@@ -2,20 +2,16 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::super::Frame;
-use super::super::interface::Columns;
+use crate::dof::embedding::EmbeddedPoint;
+use crate::dof::{Columns, Frame};
 use crate::error::SimError;
 use crate::mass::{MassProperties, embedded_mass};
-use crate::potential::elasticity::Principal;
 
 /// Volume of a tetrahedron in cubes of its longest edge below which it is flat; the regular one has 0.118.
 const FLATTEST: f64 = 1e-3;
 
 /// Farthest that the centre of mass of a part between two points may be off their line, in its length.
 const OFF_LINE_MAX: f64 = 1e-6;
-
-/// Least sum of two stretches, 2 where the part has its shape: below, the part is crushed and turns no faster.
-const STRETCHES_MIN: f64 = 0.1;
 
 /// Least 1 + cos of the angle between a rod's direction and that at rest: the shortest turn between opposite
 /// directions is not unique, and near them it changes fast.
@@ -98,10 +94,7 @@ impl Embedding {
                 Frame::new(q(0).lerp(q(1), share) + arm, turn.rotation, v(0).lerp(v(1), share) + spin.cross(arm), spin)
             }
             Self::Tetrahedron { first, weights } => {
-                let turn = Turn::new(deformation(weights, &q));
-                let shares = weights * (local - first);
-                let mean = |x: &dyn Fn(usize) -> DVec3| x(0) + edges(x) * shares;
-                Frame::new(mean(&q), turn.rotation, mean(&v), turn.spin(deformation(weights, &v)))
+                between_four(first, weights, local).frame(&[0, 1, 2, 3].map(q), &[0, 1, 2, 3].map(v))
             }
         }
     }
@@ -123,13 +116,8 @@ impl Embedding {
                 }
             }
             Self::Tetrahedron { first, weights } => {
-                let turn = Turn::new(deformation(weights, &q));
-                let shares = weights * (local - first);
-                let [a, b, c] = [weights.row(0), weights.row(1), weights.row(2)];
-                let all = [(1.0 - shares.element_sum(), -(a + b + c)), (shares.x, a), (shares.y, b), (shares.z, c)];
-                for (point, (share, gradient)) in all.into_iter().enumerate() {
-                    visit(point, &columns(|axis| (axis * share, turn.spin_along(axis, gradient))));
-                }
+                let columns = between_four(first, weights, local).columns(&[0, 1, 2, 3].map(q));
+                columns.iter().enumerate().for_each(|(point, columns)| visit(point, columns));
             }
         }
     }
@@ -146,53 +134,20 @@ fn columns(derivatives: impl Fn(DVec3) -> (DVec3, DVec3)) -> Columns {
     columns
 }
 
-fn edges(x: &dyn Fn(usize) -> DVec3) -> DMat3 {
-    DMat3::from_cols(x(1) - x(0), x(2) - x(0), x(3) - x(0))
-}
-
-/// Derivative of place with respect to place in the part's frame, given the places of the four points; its rate, given
-/// their velocities.
-fn deformation(weights: DMat3, x: &dyn Fn(usize) -> DVec3) -> DMat3 {
-    edges(x) * weights
+/// A place in a part between four points.
+fn between_four(first: DVec3, weights: DMat3, local: DVec3) -> EmbeddedPoint<4> {
+    let shares = weights * (local - first);
+    let [a, b, c] = [weights.row(0), weights.row(1), weights.row(2)];
+    EmbeddedPoint {
+        weights: [1.0 - shares.element_sum(), shares.x, shares.y, shares.z],
+        gradients: [-(a + b + c), a, b, c],
+    }
 }
 
 /// Share of the length along the line, and the rest.
 fn split(local: DVec3, direction: DVec3, length: f64) -> (f64, DVec3) {
     let along = direction.dot(local);
     (along / length, local - direction * along)
-}
-
-/// Rotation of a deformed part: F = R S, S symmetric.
-struct Turn {
-    rotation: DMat3,
-    /// Turns part axes into those of S.
-    axes: DMat3,
-    /// 1 / (sum of the other two stretches), for each axis of S.
-    ease: DVec3,
-}
-
-impl Turn {
-    fn new(f: DMat3) -> Self {
-        let Principal { u, stretches: s, v } = Principal::of(f);
-        let sums = DVec3::new(s.y + s.z, s.x + s.z, s.x + s.y).max(DVec3::splat(STRETCHES_MIN));
-        Self { rotation: u * v.transpose(), axes: v, ease: sums.recip() }
-    }
-
-    /// Angular velocity where F changes at a rate of `f`: RᵀF' − F'ᵀR = ΩS + SΩ = [(tr S − S) ω]×, in part axes.
-    fn spin(&self, f: DMat3) -> DVec3 {
-        let m = self.rotation.transpose() * f;
-        let twice = DVec3::new(m.y_axis.z - m.z_axis.y, m.z_axis.x - m.x_axis.z, m.x_axis.y - m.y_axis.x);
-        self.turn(twice)
-    }
-
-    /// The same for F' = velocity gradientᵀ.
-    fn spin_along(&self, velocity: DVec3, gradient: DVec3) -> DVec3 {
-        self.turn(gradient.cross(self.rotation.transpose() * velocity))
-    }
-
-    fn turn(&self, twice: DVec3) -> DVec3 {
-        self.rotation * (self.axes * (self.ease * (self.axes.transpose() * twice)))
-    }
 }
 
 /// The shortest turn from the direction of a line at rest to that of now.

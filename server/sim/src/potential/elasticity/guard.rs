@@ -8,7 +8,7 @@
 use glam::{DMat3, DVec3};
 
 use super::Elastic;
-use crate::eigen::symmetric_eigen;
+use crate::eigen::positive_part;
 
 /// Stretch below which compression is guarded. At 0.7 a bar still has a quarter of its stiffness; what is squeezed less
 /// is Saint Venant-Kirchhoff to the last bit.
@@ -108,10 +108,4 @@ fn beyond(stretch: f64) -> f64 {
 pub(super) fn is_positive(m: DMat3) -> bool {
     let minor = m.x_axis.x * m.y_axis.y - m.x_axis.y * m.x_axis.y;
     m.x_axis.x > 0.0 && minor > 0.0 && m.determinant() > 0.0
-}
-
-/// A symmetric matrix without its negative eigenvalues.
-fn positive_part(m: DMat3) -> DMat3 {
-    let (values, axes) = symmetric_eigen(m);
-    axes * DMat3::from_diagonal(values.max(DVec3::ZERO)) * axes.transpose()
 }
