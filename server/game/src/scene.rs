@@ -87,7 +87,7 @@ impl Scene {
     fn add_plane(&mut self, [x, y, z, friction]: [f64; 4]) -> Result<(), SimError> {
         let normal = DVec3::new(x, y, z).normalize_or_zero();
         let shape = Shape::HalfSpace { normal };
-        let plane = StaticDesc { shape, position: DVec3::ZERO, rotation: DQuat::IDENTITY, friction };
+        let plane = StaticDesc::new(Collider::new(shape, friction));
         self.world.add_static(plane).map(|_| ())
     }
 

@@ -31,7 +31,10 @@ mod settings;
 mod state;
 mod world;
 
-pub use collide::{Collider, ContactView, Shape, StaticDesc, StaticId};
+pub use collide::{
+    Collider, Collision, CollisionId, CollisionObject, CollisionSide, ContactView, Groups, Material, MaterialId, Phase,
+    Shape, StaticDesc, StaticId, Surface,
+};
 pub use dof::articulated::{
     Articulated, JointDesc, JointDrive, JointKind, JointLimit, JointMotor, JointSpring, LimitRange, PartDesc,
 };

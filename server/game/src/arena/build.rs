@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use pita_sim::{Settings, Shape, SimError, StaticDesc, World};
+use pita_sim::{Collider, Settings, Shape, SimError, StaticDesc, World};
 
 use super::{Arena, ArenaSettings, StaticInfo};
 use crate::arena_file::{ArenaError, ArenaFile, DriverFile, Key, PropFile};
@@ -55,9 +55,9 @@ impl Arena {
         for (i, piece) in file.statics.iter().enumerate() {
             let shape = Shape::from(&piece.shape);
             let (position, rotation) = (DVec3::from_array(piece.position), piece.angles().rotation());
-            let friction = friction_of(file, &piece.material);
+            let collider = Collider::new(shape.clone(), friction_of(file, &piece.material));
             self.world
-                .add_static(StaticDesc { shape: shape.clone(), position, rotation, friction })
+                .add_static(StaticDesc { collider, position, rotation })
                 .map_err(refused(&Key::new("statics").index(i)))?;
             self.statics.push(StaticInfo { shape, position, rotation });
         }

@@ -4,19 +4,29 @@
 //! points. What comes out are contact points; [`potential::contact`](crate::potential) makes potentials of them.
 
 mod broad_phase;
+mod collision;
+mod groups;
 mod half_space;
 mod manifold;
+mod material;
 mod narrow_phase;
 mod shape;
 
+use std::collections::BTreeMap;
+
 use glam::{DQuat, DVec3};
 
+pub use collision::{Collision, CollisionId, CollisionObject, CollisionSide, Phase};
+pub use groups::Groups;
+pub use material::{Material, MaterialId, Surface};
 pub use shape::{Collider, HULL_POINTS_MAX, Shape};
 
 use crate::dof::{BodyId, Placed, Pose, Twist};
 use crate::error::{SimError, require_rotation, require_vector};
 use crate::settings::Settings;
 use broad_phase::{Bounds, BroadPhase};
+use collision::{Closest, Touch};
+use material::MaterialTable;
 use narrow_phase::NarrowPhase;
 
 slotmap::new_key_type! {
@@ -27,14 +37,19 @@ slotmap::new_key_type! {
 /// A piece of static geometry to be added.
 #[derive(Clone, Debug)]
 pub struct StaticDesc {
-    /// Its shape.
-    pub shape: Shape,
+    /// What it collides with.
+    pub collider: Collider,
     /// Where it stands, m.
     pub position: DVec3,
     /// Shape to world.
     pub rotation: DQuat,
-    /// Coulomb friction coefficient.
-    pub friction: f64,
+}
+
+impl StaticDesc {
+    /// A piece that stands at the origin, not turned.
+    pub fn new(collider: Collider) -> Self {
+        Self { collider, position: DVec3::ZERO, rotation: DQuat::IDENTITY }
+    }
 }
 
 /// A contact point of the last tick.
@@ -84,12 +99,14 @@ pub(crate) struct ContactPoint {
     /// From `a` to `b`.
     pub normal: DVec3,
     pub gap: f64,
-    /// Coulomb coefficient of the pair.
-    pub friction: f64,
+    /// What the contact is like.
+    pub surface: Surface,
     /// Tangential slip of `b` against `a` that the friction spring remembers, m.
     pub anchor: DVec3,
     /// At the end of the last tick that had this point, N.
     pub normal_force: f64,
+    /// Logic lets the pair pass in this tick.
+    pub is_cancelled: bool,
     feature: u32,
 }
 
@@ -102,8 +119,10 @@ impl ContactPoint {
     /// A new point without a history between bodies that do not matter.
     #[cfg(test)]
     pub fn at(position: DVec3, normal: DVec3, gap: f64, friction: f64) -> Self {
-        let (a, b, feature) = (0, Partner::Static(0), 0);
-        Self { a, b, position, normal, gap, friction, anchor: DVec3::ZERO, normal_force: 0.0, feature }
+        let (a, b, feature, is_cancelled) = (0, Partner::Static(0), 0, false);
+        let surface = Material::from(friction).surface;
+        let (anchor, normal_force) = (DVec3::ZERO, 0.0);
+        Self { a, b, position, normal, gap, surface, anchor, normal_force, is_cancelled, feature }
     }
 }
 
@@ -119,6 +138,9 @@ struct Static {
 pub(crate) struct Detector {
     statics: slotmap::SlotMap<StaticId, Static>,
     static_serials: u32,
+    /// Handle of each piece of static geometry by its serial.
+    static_ids: BTreeMap<u32, StaticId>,
+    materials: MaterialTable,
     /// Pairs of bodies that never collide, by serial, smaller first; sorted, and once for every reason.
     excluded: Vec<(u32, u32)>,
     broad_phase: BroadPhase,
@@ -127,24 +149,81 @@ pub(crate) struct Detector {
     pairs: Vec<(u32, u32)>,
     /// Contacts of this tick, in order of pair.
     pub contacts: Vec<ContactPoint>,
+    /// What there is to tell of pairs in this tick, in order of pair.
+    touches: Vec<Touch>,
+    /// Counts detections.
+    detections: u64,
 }
 
 impl Detector {
     pub fn add_static(&mut self, desc: StaticDesc) -> Result<StaticId, SimError> {
         require_vector(desc.position, "position")?;
         require_rotation(desc.rotation, "rotation")?;
-        let collider = Collider::new(desc.shape, desc.friction);
+        let collider = desc.collider;
         collider.validate()?;
         let pose = Pose { position: desc.position, rotation: desc.rotation.normalize() };
         let half = collider.shape().half_extents(pose.rotation);
         let bounds = Bounds { min: pose.position - half, max: pose.position + half };
         let serial = self.static_serials;
         self.static_serials += 1;
-        Ok(self.statics.insert(Static { serial, collider, pose, bounds }))
+        let id = self.statics.insert(Static { serial, collider, pose, bounds });
+        self.static_ids.insert(serial, id);
+        Ok(id)
     }
 
+    /// Removes a piece, and with it its contacts and collisions of this tick. Answers whether there was one.
     pub fn remove_static(&mut self, id: StaticId) -> bool {
-        self.statics.remove(id).is_some()
+        let Some(piece) = self.statics.remove(id) else { return false };
+        self.static_ids.remove(&piece.serial);
+        let partner = Partner::Static(piece.serial);
+        self.contacts.retain(|contact| contact.b != partner);
+        self.narrow_phase.forget(|(_, b)| b == partner);
+        true
+    }
+
+    /// From now on contacts of two materials are like `surface`.
+    pub fn set_material_pair(&mut self, a: MaterialId, b: MaterialId, surface: Surface) {
+        self.materials.insert(a, b, surface);
+    }
+
+    /// Lets a pair pass in this tick. Answers whether the collision is of this tick.
+    pub fn cancel(&mut self, id: CollisionId) -> bool {
+        let touch = self.touches.get_mut(id.index as usize).filter(|_| id.detection == self.detections);
+        let Some(touch) = touch else { return false };
+        touch.is_cancelled = true;
+        let of_pair = |contact: &ContactPoint| (contact.a, contact.b);
+        let start = self.contacts.partition_point(|contact| of_pair(contact) < touch.key);
+        for contact in self.contacts[start..].iter_mut().take_while(|contact| of_pair(contact) == touch.key) {
+            (contact.is_cancelled, contact.anchor, contact.normal_force) = (true, DVec3::ZERO, 0.0);
+        }
+        true
+    }
+
+    /// The collisions of this tick, in order of pair. `side` answers what the collider with a serial is on, and itself.
+    pub fn collisions<'a>(
+        &'a self,
+        side: impl Fn(u32) -> Option<(BodyId, &'a Collider)> + 'a,
+    ) -> impl Iterator<Item = Collision> + 'a {
+        let tell = |object, collider: &Collider| CollisionSide {
+            object,
+            material: collider.material().id,
+            is_sensor: collider.is_sensor(),
+        };
+        (0..).zip(&self.touches).filter_map(move |(index, touch)| {
+            let Touch { key: (a, b), phase, closest, impulse, is_cancelled } = *touch;
+            let body = |serial| side(serial).map(|(body, collider)| tell(CollisionObject::Body(body), collider));
+            let b = match b {
+                Partner::Body(serial) => body(serial)?,
+                Partner::Static(serial) => {
+                    let id = *self.static_ids.get(&serial)?;
+                    tell(CollisionObject::Static(id), &self.statics[id].collider)
+                }
+            };
+            let Closest { position, normal, gap, approach_speed } = closest;
+            let id = CollisionId { detection: self.detections, index };
+            let sides = [body(a)?, b];
+            Some(Collision { id, phase, sides, point: position, normal, gap, approach_speed, impulse, is_cancelled })
+        })
     }
 
     /// The two bodies do not collide with each other, for one reason more.
@@ -174,7 +253,7 @@ impl Detector {
     /// Forgets a body's contacts.
     pub fn forget_contacts(&mut self, serial: u32) {
         self.contacts.retain(|c| c.a != serial && c.b != Partner::Body(serial));
-        self.narrow_phase.forget(serial);
+        self.narrow_phase.forget(|(a, b)| a == serial || b == Partner::Body(serial));
     }
 
     /// Finds all contact points of the colliders `bodies`, which are in order of serial. `look` answers `None` for what does not
@@ -191,18 +270,24 @@ impl Detector {
             let Some(body) = &look(placed) else { continue };
             while let Some(&(_, j)) = pairs.next_if(|&&(a, _)| a == i) {
                 let Some(other) = &look(&bodies[j as usize]) else { continue };
-                if body.owner != other.owner && !self.excludes(body.owner, other.owner) {
-                    self.narrow_phase.bodies(body, other, settings);
+                let meet = body.owner != other.owner && body.collider.meets(other.collider);
+                if meet && !self.excludes(body.owner, other.owner) {
+                    let surface = self.materials.contact(body.collider.material(), other.collider.material());
+                    self.narrow_phase.bodies(body, other, surface, settings);
                 }
             }
             for piece in self.statics.values() {
-                if piece.bounds.overlaps(&self.bounds[i as usize]) {
-                    self.narrow_phase.with_static(body, piece.serial, &piece.collider, piece.pose, settings);
+                if piece.bounds.overlaps(&self.bounds[i as usize]) && body.collider.meets(&piece.collider) {
+                    let surface = self.materials.contact(body.collider.material(), piece.collider.material());
+                    let at = (piece.serial, &piece.collider, piece.pose);
+                    self.narrow_phase.with_static(body, at, surface, settings);
                 }
             }
         }
         self.contacts.clear();
-        self.narrow_phase.finish(&mut self.contacts);
+        self.touches.clear();
+        self.detections += 1;
+        self.narrow_phase.finish(&mut self.contacts, &mut self.touches, settings);
     }
 
     /// Remembers what the friction springs and normal forces of `contacts` became.

@@ -9,10 +9,11 @@ use parry3d_f64::math::Pose as ParryPose;
 use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
 use parry3d_f64::shape::PackedFeatureId;
 
+use super::collision::{Closest, Meeting, Phase, Touch};
 use super::half_space;
 use super::manifold::{Manifold, ManifoldPoint, POINTS_MAX};
 use super::shape::{Collider, Shape};
-use super::{ContactPoint, Moving, Partner};
+use super::{ContactPoint, Moving, Partner, Surface};
 use crate::dof::Pose;
 use crate::settings::Settings;
 
@@ -27,10 +28,48 @@ struct Pair {
     points: ArrayVec<ContactPoint, POINTS_MAX>,
     /// Parry's own memory of the pair: the last separating direction.
     parry: ContactManifold<(), ()>,
+    /// That it sees only: its points are no contacts.
+    is_sensor: bool,
+    /// Where it touches in this tick, and where it did in the last.
+    touch: Option<Closest>,
+    last_touch: Option<Closest>,
+    /// Of the last tick, N s.
+    impulse: f64,
+}
+
+impl Pair {
+    fn new() -> Self {
+        let (points, parry) = (ArrayVec::new(), ContactManifold::new());
+        Self { points, parry, is_sensor: false, touch: None, last_touch: None, impulse: 0.0 }
+    }
+
+    /// Nothing is known of it.
+    fn clear(&mut self) {
+        let parry = std::mem::take(&mut self.parry);
+        *self = Self { parry, ..Self::new() };
+        self.parry.clear();
+    }
+
+    /// Starts a tick.
+    fn begin(&mut self, settings: &Settings) {
+        self.last_touch = self.touch.take();
+        self.impulse = settings.dt * self.points.iter().map(|point| point.normal_force).sum::<f64>();
+    }
+
+    /// What there is to tell of it, after [`Pair::begin`].
+    fn tell(&self, key: Key) -> Option<Touch> {
+        let (phase, closest) = match (self.last_touch, self.touch) {
+            (None, None) => return None,
+            (None, Some(now)) => (Phase::Begin, now),
+            (Some(_), Some(now)) => (Phase::Stay, now),
+            (Some(last), None) => (Phase::End, last),
+        };
+        Some(Touch { key, phase, closest, impulse: self.impulse, is_cancelled: false })
+    }
 }
 
 /// Serial of the first body, and its partner.
-type Key = (u32, Partner);
+pub(crate) type Key = (u32, Partner);
 
 /// A pair of a tick and its place in memory, which the next tick takes over.
 #[derive(Clone, Copy)]
@@ -67,18 +106,26 @@ impl NarrowPhase {
     }
 
     /// Contacts of two bodies.
-    pub fn bodies(&mut self, a: &Moving, b: &Moving, settings: &Settings) {
+    pub fn bodies(&mut self, a: &Moving, b: &Moving, surface: Surface, settings: &Settings) {
         let margin =
             margin((a.twist.linear - b.twist.linear).length(), reach(a, settings) + reach(b, settings), settings);
         self.manifold.clear();
         let key = (a.serial, Partner::Body(b.serial));
-        let pair = self.take(key);
+        let pair = self.take(key, a.collider.is_sensor() || b.collider.is_sensor(), settings);
         self.parry(pair, (a.collider, a.pose), (b.collider, b.pose), margin);
-        self.update(key, pair, friction(a.collider, b.collider));
+        self.update(key, pair, &Meeting { a, b: Some(b), surface }, settings);
     }
 
     /// Contacts of a body with a piece of static geometry.
-    pub fn with_static(&mut self, a: &Moving, serial: u32, piece: &Collider, pose: Pose, settings: &Settings) {
+    pub fn with_static(
+        &mut self,
+        a: &Moving,
+        (serial, piece, pose): (u32, &Collider, Pose),
+        surface: Surface,
+        settings: &Settings,
+    ) {
+        let is_sensor = a.collider.is_sensor() || piece.is_sensor();
+        let meeting = Meeting { a, b: None, surface };
         let margin = margin(a.twist.linear.length(), reach(a, settings), settings);
         let key = (a.serial, Partner::Static(serial));
         self.manifold.clear();
@@ -91,60 +138,76 @@ impl NarrowPhase {
             if self.manifold.reduced().is_empty() {
                 return;
             }
-            let pair = self.take(key);
-            self.update(key, pair, friction(a.collider, piece));
+            let pair = self.take(key, is_sensor, settings);
+            self.update(key, pair, &meeting, settings);
             return;
         }
-        let pair = self.take(key);
+        let pair = self.take(key, is_sensor, settings);
         self.parry(pair, (a.collider, a.pose), (piece, pose), margin);
-        self.update(key, pair, friction(a.collider, piece));
+        self.update(key, pair, &meeting, settings);
     }
 
-    /// Ends a tick: writes all points, sorted by pair.
-    pub fn finish(&mut self, contacts: &mut Vec<ContactPoint>) {
-        self.spare.extend(self.last.drain(..).filter_map(|known| known.place));
-        self.pairs.sort_unstable_by_key(Known::key);
-        for place in self.pairs.iter().filter_map(|known| known.place) {
-            contacts.extend_from_slice(&self.memory[place as usize].points);
+    /// Ends a tick: writes the points of all pairs that push, and what there is to tell of pairs, sorted by pair.
+    pub fn finish(&mut self, contacts: &mut Vec<ContactPoint>, touches: &mut Vec<Touch>, settings: &Settings) {
+        let Self { memory, last, pairs, spare, .. } = self;
+        for Known { key, place } in last.drain(..) {
+            let Some(place) = place else { continue };
+            let pair = &mut memory[place as usize];
+            pair.begin(settings);
+            touches.extend(pair.tell(key));
+            spare.push(place);
         }
+        pairs.sort_unstable_by_key(Known::key);
+        for &Known { key, place } in pairs.iter() {
+            let Some(pair) = place.map(|place| &memory[place as usize]) else { continue };
+            touches.extend(pair.tell(key));
+            if !pair.is_sensor {
+                contacts.extend_from_slice(&pair.points);
+            }
+        }
+        touches.sort_unstable_by_key(|touch| touch.key);
     }
 
     /// Takes over what the solver did to the points that [`NarrowPhase::finish`] wrote, in the same order.
     pub fn remember(&mut self, contacts: &[ContactPoint]) {
         let mut contacts = contacts.iter();
         for place in self.pairs.iter().filter_map(|known| known.place) {
-            let points = &mut self.memory[place as usize].points;
+            let Pair { points, is_sensor, .. } = &mut self.memory[place as usize];
+            if *is_sensor {
+                continue;
+            }
             points.iter_mut().zip(&mut contacts).for_each(|(mine, theirs)| *mine = *theirs);
         }
     }
 
-    /// Drops every pair of a body.
-    pub fn forget(&mut self, serial: u32) {
+    /// Drops every pair of which `is_gone` says so.
+    pub fn forget(&mut self, is_gone: impl Fn(Key) -> bool) {
         let Self { pairs, spare, .. } = self;
-        pairs.retain(|Known { key: (a, b), place }| {
-            let gone = *a == serial || *b == Partner::Body(serial);
+        pairs.retain(|&Known { key, place }| {
+            let gone = is_gone(key);
             spare.extend(place.filter(|_| gone));
             !gone
         });
     }
 
     /// Place in memory of a pair, with what the last tick left there where it has been one.
-    fn take(&mut self, key: Key) -> usize {
+    fn take(&mut self, key: Key, is_sensor: bool, settings: &Settings) -> usize {
         let known = self.last.binary_search_by_key(&key, Known::key).ok();
         let place = known.and_then(|i| self.last[i].place.take()).unwrap_or_else(|| self.blank());
         self.pairs.push(Known { key, place: Some(place) });
+        let pair = &mut self.memory[place as usize];
+        pair.begin(settings);
+        pair.is_sensor = is_sensor;
         place as usize
     }
 
     /// Place in memory of a pair of which nothing is known.
     fn blank(&mut self) -> u32 {
         if let Some(place) = self.spare.pop() {
-            let Pair { points, parry } = &mut self.memory[place as usize];
-            points.clear();
-            parry.clear();
+            self.memory[place as usize].clear();
             return place;
         }
-        self.memory.push(Pair { points: ArrayVec::new(), parry: ContactManifold::new() });
+        self.memory.push(Pair::new());
         self.memory.len() as u32 - 1
     }
 
@@ -173,7 +236,7 @@ impl NarrowPhase {
     }
 
     /// Makes contact points of the manifold's points, with the memory of those that were there last tick.
-    fn update(&mut self, (a, b): Key, pair: usize, friction: f64) {
+    fn update(&mut self, (a, b): Key, pair: usize, meeting: &Meeting, settings: &Settings) {
         let pair = &mut self.memory[pair];
         let mut old = std::mem::take(&mut pair.points);
         let single = self.manifold.reduced().len() == 1 && old.len() == 1;
@@ -189,8 +252,12 @@ impl NarrowPhase {
                 (memory.anchor - normal * normal.dot(memory.anchor), memory.normal_force)
             });
             let ManifoldPoint { position, gap, feature } = *point;
-            pair.points.push(ContactPoint { a, b, position, normal, gap, friction, anchor, normal_force, feature });
+            let (surface, is_cancelled) = (meeting.surface, false);
+            let point =
+                ContactPoint { a, b, position, normal, gap, surface, anchor, normal_force, is_cancelled, feature };
+            pair.points.push(point);
         }
+        pair.touch = meeting.closest(&pair.points, pair.last_touch.is_some(), settings);
     }
 }
 
@@ -209,10 +276,6 @@ fn reach(body: &Moving, settings: &Settings) -> f64 {
         _ => spin,
     };
     (settings.dt * across.length()).min(2.0) * body.collider.bounding_radius()
-}
-
-fn friction(a: &Collider, b: &Collider) -> f64 {
-    (a.friction() * b.friction()).sqrt()
 }
 
 fn name(a: PackedFeatureId, b: PackedFeatureId) -> u32 {

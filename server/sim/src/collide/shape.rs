@@ -6,6 +6,8 @@ use glam::{DQuat, DVec3};
 use parry3d_f64::math::Pose as ParryPose;
 use parry3d_f64::shape::SharedShape;
 
+use super::groups::Groups;
+use super::material::Material;
 use crate::error::{SimError, require, require_vector};
 
 /// A collision shape in its body's frame, metres.
@@ -179,19 +181,32 @@ fn spans_a_volume(points: &[DVec3]) -> Result<(), SimError> {
 #[derive(Clone, Debug)]
 pub struct Collider {
     shape: Shape,
-    friction: f64,
+    material: Material,
+    groups: Groups,
+    is_sensor: bool,
     /// The shape for the fine phase, with its rotation into the body's frame. Built once: hulls are costly.
     parry: Option<(SharedShape, DQuat)>,
     bounding_radius: f64,
 }
 
 impl Collider {
-    /// A collider with a Coulomb friction coefficient; a pair's is the geometric mean of both.
-    pub fn new(shape: Shape, friction: f64) -> Self {
+    /// A collider of a material, or with a Coulomb coefficient of friction and nothing else.
+    pub fn new(shape: Shape, material: impl Into<Material>) -> Self {
         // What does not validate is never handed to parry.
         let parry = shape.validate().and_then(|()| shape.parry()).ok().map(|parry| (parry, shape.parry_rotation()));
         let bounding_radius = shape.bounding_radius();
-        Self { shape, friction, parry, bounding_radius }
+        let (material, groups, is_sensor) = (material.into(), Groups::ALL, false);
+        Self { shape, material, groups, is_sensor, parry, bounding_radius }
+    }
+
+    /// The same in other groups.
+    pub fn with_groups(self, groups: Groups) -> Self {
+        Self { groups, ..self }
+    }
+
+    /// The same as a sensor: it sees what overlaps it, and neither pushes nor is pushed. Sensors do not see each other.
+    pub fn into_sensor(self) -> Self {
+        Self { is_sensor: true, ..self }
     }
 
     /// Its shape.
@@ -199,9 +214,24 @@ impl Collider {
         &self.shape
     }
 
-    /// Its friction coefficient.
-    pub fn friction(&self) -> f64 {
-        self.friction
+    /// What it is made of.
+    pub fn material(&self) -> &Material {
+        &self.material
+    }
+
+    /// Its groups.
+    pub fn groups(&self) -> Groups {
+        self.groups
+    }
+
+    /// Whether it sees and does not push.
+    pub fn is_sensor(&self) -> bool {
+        self.is_sensor
+    }
+
+    /// Whether the two look at each other at all.
+    pub(crate) fn meets(&self, other: &Self) -> bool {
+        self.groups.meet(other.groups) && !(self.is_sensor && other.is_sensor)
     }
 
     pub(crate) fn bounding_radius(&self) -> f64 {
@@ -211,7 +241,7 @@ impl Collider {
     /// # Errors
     /// [`SimError`] naming the first value that is out of range.
     pub fn validate(&self) -> Result<(), SimError> {
-        require((0.0..=10.0).contains(&self.friction), "friction", self.friction, "0 to 10")?;
+        self.material.surface.validate()?;
         self.shape.validate()?;
         // What passes the checks above and is still no hull would pass through everything.
         if self.parry.is_some() { Ok(()) } else { Err(SimError::Unusable { what: FLAT_HULL }) }

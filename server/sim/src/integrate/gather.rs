@@ -353,8 +353,11 @@ fn spot(scene: &Scene, anchor: Anchor) -> Option<Spot> {
     Some(Spot::Body(body.index, PartPoint { part: anchor.part, point: anchor.point }))
 }
 
-/// Where a contact acts: at the frames of the two colliders.
+/// Where a contact acts: at the frames of the two colliders; nowhere if logic lets the pair pass.
 fn contact_spots(scene: &Scene, contact: &ContactPoint) -> Option<[Spot; 2]> {
+    if contact.is_cancelled {
+        return None;
+    }
     let spot = |serial: u32| {
         let place = scene.placed.binary_search_by_key(&serial, |placed| placed.serial).ok()?;
         let Placed { body, at, .. } = scene.placed[place];

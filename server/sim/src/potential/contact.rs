@@ -120,9 +120,9 @@ impl ContactTerm {
             normal_stiffness: stiffness * unit,
             tangent_stiffness: settings.tangent_stiffness * unit,
             transition: settings.transition,
-            friction: point.friction,
+            friction: point.surface.friction,
             anchor: point.anchor,
-            limit: point.friction * point.normal_force,
+            limit: point.surface.friction * point.normal_force,
             is_impact: overlap > settings.transition || (closes && point.normal_force == 0.0),
         }
     }

@@ -2,6 +2,7 @@
 //! are the engine's.
 
 mod bodies;
+mod collisions;
 mod conserved;
 mod joints;
 mod potentials;
@@ -9,7 +10,7 @@ mod state;
 
 use slotmap::SlotMap;
 
-use crate::collide::{ContactView, Detector, Moving, Partner};
+use crate::collide::{Detector, Moving};
 use crate::dof::{Body, BodyId, Placed};
 use crate::error::SimError;
 use crate::integrate::{Integrator, Scene, StepReport};
@@ -132,23 +133,5 @@ impl World {
     /// What the last integration did.
     pub fn report(&self) -> &StepReport {
         &self.report
-    }
-
-    /// Contact points of the last tick, in a stable order.
-    pub fn contacts(&self) -> impl Iterator<Item = ContactView> + '_ {
-        self.detector.contacts.iter().filter_map(|c| {
-            let b = match c.b {
-                Partner::Body(serial) => Some(self.body_of(serial)?),
-                Partner::Static(_) => None,
-            };
-            let (point, normal, gap, normal_force) = (c.position, c.normal, c.gap, c.normal_force);
-            Some(ContactView { a: self.body_of(c.a)?, b, point, normal, gap, normal_force })
-        })
-    }
-
-    /// The body that a collider belongs to.
-    fn body_of(&self, serial: u32) -> Option<BodyId> {
-        let place = self.placed.binary_search_by_key(&serial, |placed| placed.serial).ok()?;
-        Some(self.placed[place].body)
     }
 }

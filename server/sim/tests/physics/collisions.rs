@@ -69,7 +69,7 @@ fn friction_sticks_and_slides() {
         let mut world = world();
         let normal = DVec3::new(angle.sin(), angle.cos(), 0.0);
         let shape = Shape::HalfSpace { normal };
-        let plane = StaticDesc { shape, position: DVec3::ZERO, rotation: DQuat::IDENTITY, friction: 0.5 };
+        let plane = StaticDesc::new(Collider::new(shape, 0.5));
         world.add_static(plane).unwrap();
         let cube = cube(&mut world, normal * 0.5);
         world.set_pose(cube, normal * 0.5, DQuat::from_rotation_z(-angle)).unwrap();
@@ -127,7 +127,7 @@ fn fast_bodies_do_not_tunnel() {
         let mut world = weightless();
         let wall = Shape::Box { half: DVec3::new(0.005, 5.0, 5.0) };
         let at = DVec3::X * 10.0;
-        world.add_static(StaticDesc { shape: wall, position: at, rotation: DQuat::IDENTITY, friction: 0.5 }).unwrap();
+        world.add_static(StaticDesc { position: at, ..StaticDesc::new(Collider::new(wall, 0.5)) }).unwrap();
         let ball = body(&mut world, Shape::Ball { radius: 0.1 }, 1.0, DVec3::new(0.013, 0.02, 0.03), 0.5);
         world.set_velocity(ball, DVec3::X * speed, DVec3::ZERO).unwrap();
         for _ in 0..60 {
@@ -164,7 +164,7 @@ fn a_rolling_wheel_is_a_rounded_cylinder() {
     ground(&mut world);
     let table = Shape::Box { half: DVec3::new(2.0, 0.5, 2.0) };
     let at = DVec3::new(0.0, 0.5, 20.0);
-    world.add_static(StaticDesc { shape: table, position: at, rotation: DQuat::IDENTITY, friction: 0.5 }).unwrap();
+    world.add_static(StaticDesc { position: at, ..StaticDesc::new(Collider::new(table, 0.5)) }).unwrap();
     let wheel = Shape::Cylinder { half_length: 0.15, radius: 0.4, rounding: 0.05 };
     let wheel = thrown(&mut world, wheel, 20.0, DVec3::Y * 0.45, DVec3::X * 4.0, DVec3::Z * -10.0);
     let corners = (0..8).map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) - 0.5);

@@ -39,7 +39,7 @@ fn bad_values_are_named() {
     let moving = RigidBodyDesc { collider, ..RigidBodyDesc::new(DVec3::ZERO, 1.0, DVec3::ONE) };
     refused(world.add_rigid_body(moving), "a half-space cannot move");
     let shape = Shape::Ball { radius: -1.0 };
-    let piece = StaticDesc { shape, position: DVec3::ZERO, rotation: DQuat::IDENTITY, friction: 0.5 };
+    let piece = StaticDesc::new(Collider::new(shape, 0.5));
     refused(world.add_static(piece), "radius is -1");
     let position = DVec3::INFINITY;
     refused(

@@ -17,7 +17,7 @@ mod sheep_forms;
 mod solvers;
 mod tolerance;
 
-use pita_sim::{BodyId, Collider, DQuat, DVec3, ParticleDesc, RigidBodyDesc, Settings, Shape, StaticDesc, World};
+use pita_sim::{BodyId, Collider, DVec3, ParticleDesc, RigidBodyDesc, Settings, Shape, StaticDesc, World};
 
 /// The talk's tick, s.
 const DT: f64 = 1.0 / 30.0;
@@ -54,5 +54,5 @@ fn cube(world: &mut World, position: DVec3) -> BodyId {
 
 fn ground(world: &mut World) {
     let shape = Shape::HalfSpace { normal: DVec3::Y };
-    world.add_static(StaticDesc { shape, position: DVec3::ZERO, rotation: DQuat::IDENTITY, friction: 0.5 }).unwrap();
+    world.add_static(StaticDesc::new(Collider::new(shape, 0.5))).unwrap();
 }
