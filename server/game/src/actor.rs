@@ -3,7 +3,7 @@
 //! An actor owns the bodies that it added to the world and is the only one to push on them. It acts in stage 3 and
 //! only through forces and actuators; poses are set only to place it anew.
 
-use pita_sim::{BodyId, Shape, SimError, World};
+use pita_sim::{BodyId, DVec3, Phase, Shape, SimError, StaticId, World};
 
 use crate::{Controls, Pose};
 
@@ -39,6 +39,64 @@ pub struct Step<'a> {
     pub dt: f64,
 }
 
+/// A collision of an actor, as stage 2 found it.
+#[derive(Clone, Copy, Debug)]
+pub struct Contact<'a> {
+    /// Whether it begins, goes on or has ended.
+    pub phase: Phase,
+    /// The actor's own side.
+    pub own: ContactSide<'a>,
+    /// The other side.
+    pub other: ContactSide<'a>,
+    /// What is there: ground, or a victim.
+    pub partner: Partner,
+    /// Where, m.
+    pub point: DVec3,
+    /// Unit vector from the actor to the other.
+    pub normal: DVec3,
+    /// Distance of the surfaces at the start of the tick, m; negative where they overlap.
+    pub gap: f64,
+    /// How fast they come closer at the start of the tick, m/s; negative where they part.
+    pub approach_speed: f64,
+    /// That they gave each other along the normal in the last tick, N s: the tick after the blow knows how hard it was.
+    pub impulse: f64,
+}
+
+/// A side of a [`Contact`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactSide<'a> {
+    /// The body; `None` for what never moves.
+    pub body: Option<BodyId>,
+    /// Name of its material in the arena's file, `chassis` or `tyre`; empty where it has none.
+    pub material: &'a str,
+    /// Whether it sees and does not push.
+    pub is_sensor: bool,
+}
+
+/// What an actor collides with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Partner {
+    /// What never moves.
+    Ground(StaticId),
+    /// Another actor.
+    Actor {
+        /// Its id.
+        id: u32,
+        /// Its [`ActorInfo::kind`].
+        kind: &'static str,
+    },
+}
+
+/// What becomes of a contact in this tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Response {
+    /// The two push each other apart, unless the other side lets them pass.
+    #[default]
+    Collide,
+    /// They pass through each other in this tick.
+    Pass,
+}
+
 /// A thing with game logic.
 pub trait Actor: Send {
     /// What it is.
@@ -49,6 +107,12 @@ pub trait Actor: Send {
 
     /// Input mapping, stage 1: the newest controls of the player whose slot it has.
     fn control(&mut self, _controls: Controls) {}
+
+    /// Stage 3, before any [`Actor::step`]: the collision procedure. It hears of every collision of the actor, sensors
+    /// included, once a tick from the tick in which the two will meet to the one in which they have parted.
+    fn collide(&mut self, _contact: &Contact) -> Response {
+        Response::Collide
+    }
 
     /// Stage 3: sets forces and actuators for this tick's integration.
     ///

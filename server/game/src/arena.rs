@@ -4,16 +4,17 @@
 //! the outside's is a method here. Reading it never changes it.
 
 mod build;
+mod collisions;
 mod players;
 
 use std::collections::BTreeMap;
 
 use glam::{DQuat, DVec3};
-use pita_sim::{Shape, World};
+use pita_sim::{BodyId, Collision, Shape, World};
 
 use crate::Controls;
 use crate::actor::{Actor, ActorInfo, Step};
-use crate::arena_file::BoundsFile;
+use crate::arena_file::{BoundsFile, Materials};
 use crate::pipeline::Ports;
 use crate::spawn::{self, Pose};
 use crate::vehicle::VehicleParameters;
@@ -99,12 +100,15 @@ pub struct Arena {
     statics: Vec<StaticInfo>,
     /// What leaves it is put back.
     bounds: BoundsFile,
+    materials: Materials,
     vehicle: VehicleParameters,
     /// Never empty.
     spawns: Vec<Pose>,
     /// By id.
     actors: BTreeMap<u32, Box<dyn Actor>>,
     next_actor: u32,
+    /// Actor of each body.
+    owners: BTreeMap<BodyId, u32>,
     /// Actor of each slot.
     slots: BTreeMap<u16, u32>,
     events: Vec<ArenaEvent>,
@@ -112,6 +116,8 @@ pub struct Arena {
     commands: Vec<Command>,
     /// Likewise: actors of this tick.
     acting: Vec<u32>,
+    /// Likewise: collisions of this tick.
+    collisions: Vec<Collision>,
 }
 
 impl Arena {
@@ -158,6 +164,11 @@ impl Arena {
         self.slots.get(&slot).and_then(|id| self.actors.get(id)).map(|actor| actor.describe())
     }
 
+    /// The surfaces of the arena.
+    pub fn materials(&self) -> &Materials {
+        &self.materials
+    }
+
     /// What happened in the last tick, in order.
     pub fn events(&self) -> &[ArenaEvent] {
         &self.events
@@ -179,8 +190,9 @@ impl Arena {
         self.world.detect_collisions();
     }
 
-    /// Stage 3: puts back what got lost and lets every actor act, in order of id.
+    /// Stage 3: lets every actor judge its collisions, puts back what got lost, and lets every actor act, in order of id.
     pub(crate) fn run_logic(&mut self) {
+        self.judge_collisions();
         let mut ids = std::mem::take(&mut self.acting);
         ids.clear();
         ids.extend(self.actors.keys());

@@ -7,6 +7,7 @@
 
 mod checks;
 mod key;
+pub(crate) mod material;
 mod shape;
 mod solver;
 mod tables;
@@ -14,7 +15,8 @@ mod tables;
 use pita_sim::SimError;
 
 pub use key::Key;
-pub use shape::{Angles, Material, ShapeFile};
+pub use material::{MaterialFile, MaterialPairFile, Materials};
+pub use shape::{Angles, ShapeFile};
 pub use solver::SolverFile;
 pub use tables::{ArenaFile, BoundsFile, DriverFile, PropFile, RouteFile, SpawnFile, SpawnGridFile, StaticFile};
 

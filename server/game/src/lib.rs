@@ -20,7 +20,7 @@ pub mod scene;
 pub mod spawn;
 pub mod vehicle;
 
-pub use actor::{Actor, ActorInfo, PartInfo};
+pub use actor::{Actor, ActorInfo, Contact, ContactSide, PartInfo, Partner, Response};
 pub use arena::{Arena, ArenaEvent, ArenaSettings, Command, StaticInfo};
 pub use arena_file::ArenaError;
 pub use controls::Controls;

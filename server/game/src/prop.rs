@@ -1,6 +1,6 @@
 //! Loose things to knock over: one body, no logic.
 
-use pita_sim::{BodyId, Collider, RigidBodyDesc, Shape, SimError, World};
+use pita_sim::{BodyId, Collider, Material, RigidBodyDesc, Shape, SimError, World};
 
 use crate::actor::{Actor, ActorInfo, PartInfo};
 use crate::spawn::Pose;
@@ -15,8 +15,8 @@ pub struct PropDesc {
     pub shape: Shape,
     /// Mass, kg.
     pub mass: f64,
-    /// Coefficient of friction.
-    pub friction: f64,
+    /// What it is made of.
+    pub material: Material,
     /// Where its centre is, m, and its heading.
     pub home: Pose,
 }
@@ -37,7 +37,7 @@ impl Prop {
         let inertia = desc.shape.inertia(desc.mass);
         let body = world.add_rigid_body(RigidBodyDesc {
             rotation: desc.home.rotation(),
-            collider: Some(Collider::new(desc.shape.clone(), desc.friction)),
+            collider: Some(Collider::new(desc.shape.clone(), desc.material)),
             ..RigidBodyDesc::new(desc.home.position, desc.mass, inertia)
         })?;
         let parts = vec![PartInfo { slice: world.serial(body).unwrap_or_default(), shape: desc.shape }];

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use pita_sim::{Collider, Settings, Shape, SimError, StaticDesc, World};
+use pita_sim::{Collider, Material, Settings, Shape, SimError, StaticDesc, World};
 
 use super::{Arena, ArenaSettings, StaticInfo};
-use crate::arena_file::{ArenaError, ArenaFile, DriverFile, Key, PropFile};
+use crate::arena_file::{ArenaError, ArenaFile, DriverFile, Key, Materials, PropFile};
 use crate::driver::{Driver, RouteDriver};
 use crate::prop::{Prop, PropDesc};
 use crate::spawn::Pose;
@@ -34,6 +34,9 @@ impl Arena {
             world,
             statics: Vec::with_capacity(file.statics.len()),
             bounds: file.bounds,
+            materials: Materials::new(&file.materials),
+            owners: BTreeMap::new(),
+            collisions: Vec::new(),
             vehicle: file.vehicle.clone(),
             spawns: spawn_points(&file),
             actors: BTreeMap::new(),
@@ -43,6 +46,7 @@ impl Arena {
             commands: Vec::new(),
             acting: Vec::new(),
         };
+        arena.set_material_pairs(&file)?;
         arena.add_statics(&file)?;
         arena.add_props(&file)?;
         arena.add_drivers(&file)?;
@@ -51,11 +55,20 @@ impl Arena {
         Ok(arena)
     }
 
+    fn set_material_pairs(&mut self, file: &ArenaFile) -> Result<(), ArenaError> {
+        for (i, pair) in file.material_pairs.iter().enumerate() {
+            let [a, b] = [0, 1].map(|side| self.materials.id(&pair.between[side]).unwrap_or_default());
+            let surface = pair.contact.into();
+            self.world.set_material_pair(a, b, surface).map_err(refused(&Key::new("material_pairs").index(i)))?;
+        }
+        Ok(())
+    }
+
     fn add_statics(&mut self, file: &ArenaFile) -> Result<(), ArenaError> {
         for (i, piece) in file.statics.iter().enumerate() {
             let shape = Shape::from(&piece.shape);
             let (position, rotation) = (DVec3::from_array(piece.position), piece.angles().rotation());
-            let collider = Collider::new(shape.clone(), friction_of(file, &piece.material));
+            let collider = Collider::new(shape.clone(), material(&self.materials, &piece.material));
             self.world
                 .add_static(StaticDesc { collider, position, rotation })
                 .map_err(refused(&Key::new("statics").index(i)))?;
@@ -71,7 +84,7 @@ impl Arena {
                     name: prop.name.clone(),
                     shape: Shape::from(&prop.shape),
                     mass: prop.mass,
-                    friction: friction_of(file, &prop.material),
+                    material: material(&self.materials, &prop.material),
                     home,
                 };
                 let id = self.new_id();
@@ -101,8 +114,8 @@ fn refused(key: &Key) -> impl FnOnce(SimError) -> ArenaError + use<> {
 }
 
 /// Materials are checked to exist when the file is read.
-fn friction_of(file: &ArenaFile, material: &str) -> f64 {
-    file.materials[material].friction
+fn material(materials: &Materials, name: &str) -> Material {
+    materials.get(name).copied().unwrap_or_default()
 }
 
 fn spawn_points(file: &ArenaFile) -> Vec<Pose> {

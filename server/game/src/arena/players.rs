@@ -1,6 +1,9 @@
 //! Players come, drive and leave.
 
+use pita_sim::{SimError, World};
+
 use super::{Arena, ArenaEvent, Command};
+use crate::Actor;
 use crate::driver::Driver;
 use crate::spawn;
 use crate::vehicle::{Identity, Vehicle};
@@ -50,8 +53,23 @@ impl Arena {
         id
     }
 
-    pub(super) fn add(&mut self, actor: Box<dyn crate::Actor>) {
+    /// Adds an actor of a game's own: `build` is given the world, to add its bodies, and the actor's id.
+    ///
+    /// # Errors
+    /// What `build` says; nothing is added then.
+    pub fn add_actor(
+        &mut self,
+        build: impl FnOnce(&mut World, u32) -> Result<Box<dyn Actor>, SimError>,
+    ) -> Result<u32, SimError> {
+        let id = self.new_id();
+        let actor = build(&mut self.world, id)?;
+        self.add(actor);
+        Ok(id)
+    }
+
+    pub(super) fn add(&mut self, actor: Box<dyn Actor>) {
         let info = actor.describe().clone();
+        self.owners.extend(actor.bodies().iter().map(|&body| (body, info.id)));
         self.actors.insert(info.id, actor);
         self.events.push(ArenaEvent::ActorAdded(info));
     }
@@ -59,6 +77,7 @@ impl Arena {
     fn remove(&mut self, id: u32) {
         let Some(actor) = self.actors.remove(&id) else { return };
         for &body in actor.bodies() {
+            self.owners.remove(&body);
             self.world.remove_body(body);
         }
         self.events.push(ArenaEvent::ActorRemoved(id));

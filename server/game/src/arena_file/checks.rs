@@ -1,6 +1,6 @@
 //! The ranges of an arena file, and that its names refer to something.
 
-use super::{ArenaError, ArenaFile, Key};
+use super::{ArenaError, ArenaFile, Key, material};
 
 /// Most statics, spawn points and props each, copies and grids counted.
 const THINGS_MAX: usize = 4_096;
@@ -22,9 +22,7 @@ impl ArenaFile {
         Key::new("max_players").count(self.max_players.into(), 1, 1_024, "players")?;
         Key::new("gravity").number(self.gravity, 0.0, 100.0, "m/s^2")?;
         self.check_bounds()?;
-        for (name, material) in &self.materials {
-            material.check(&Key::new("materials").at(name))?;
-        }
+        material::check(&self.materials, &self.material_pairs)?;
         self.vehicle.check(&Key::new("vehicle"))?;
         self.check_statics()?;
         self.check_spawns()?;
@@ -144,7 +142,7 @@ fn check_text(key: &Key, text: &str, max: usize) -> Result<(), ArenaError> {
     key.require(printable && text.len() <= max, format_args!("{text:?}"), &allowed)
 }
 
-fn one_of<'a>(table: &str, names: impl Iterator<Item = &'a String>) -> String {
+pub(super) fn one_of<'a>(table: &str, names: impl Iterator<Item = &'a String>) -> String {
     let names: Vec<&str> = names.map(String::as_str).collect();
     if names.is_empty() {
         format!("a name from [{table}], which is empty")

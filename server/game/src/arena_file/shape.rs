@@ -1,4 +1,4 @@
-//! Shapes and materials as an arena file writes them.
+//! Shapes as an arena file writes them.
 
 use glam::{DQuat, DVec3, EulerRot};
 use pita_sim::Shape;
@@ -85,22 +85,6 @@ impl From<&ShapeFile> for Shape {
             ShapeFile::Capsule { half_length, radius } => Self::Capsule { half_length, radius },
             ShapeFile::Cylinder { half_length, radius, rounding } => Self::Cylinder { half_length, radius, rounding },
         }
-    }
-}
-
-/// What a surface is like; `[materials.NAME]`.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Material {
-    /// Coefficient of friction.
-    pub friction: f64,
-}
-
-impl Material {
-    /// # Errors
-    /// [`ArenaError::OutOfRange`] for the first number out of range, below `key`.
-    pub fn check(&self, key: &Key) -> Result<(), ArenaError> {
-        key.at("friction").number(self.friction, 0.0, 5.0, "")
     }
 }
 

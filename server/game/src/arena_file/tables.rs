@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use serde::Deserialize;
 
-use super::{Angles, Material, ShapeFile, SolverFile};
+use super::{Angles, MaterialFile, MaterialPairFile, ShapeFile, SolverFile};
 use crate::vehicle::VehicleParameters;
 
 /// A whole file.
@@ -28,7 +28,10 @@ pub struct ArenaFile {
     #[serde(default)]
     pub bounds: BoundsFile,
     /// Surfaces, by name.
-    pub materials: BTreeMap<String, Material>,
+    pub materials: BTreeMap<String, MaterialFile>,
+    /// Pairs of surfaces whose contacts are not as the rule says.
+    #[serde(default)]
+    pub material_pairs: Vec<MaterialPairFile>,
     /// Geometry that never moves.
     #[serde(default)]
     pub statics: Vec<StaticFile>,

@@ -1,11 +1,12 @@
 //! The bodies of a car and how they hang together.
 
 use glam::DVec3;
-use pita_sim::{AxleControl, AxleDesc, AxleId, BodyId, Collider, RigidBodyDesc, Shape, SimError, World};
+use pita_sim::{AxleControl, AxleDesc, AxleId, BodyId, Collider, Material, RigidBodyDesc, Shape, SimError, World};
 
 use super::VehicleParameters;
 use crate::Pose;
 use crate::actor::PartInfo;
+use crate::arena_file::material;
 
 /// Place of a wheel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,16 +72,16 @@ impl Rig {
         let chassis_shape = Shape::Box { half: DVec3::from_array(p.chassis_half) };
         let wheel_shape =
             Shape::Cylinder { half_length: p.wheel_half_width, radius: p.wheel_radius, rounding: p.wheel_rounding };
-        let mut add_body = |shape: &Shape, mass, friction, at: DVec3| {
+        let mut add_body = |shape: &Shape, mass, material: Material, at: DVec3| {
             let desc = RigidBodyDesc {
                 rotation: pose.rotation(),
-                collider: Some(Collider::new(shape.clone(), friction)),
+                collider: Some(Collider::new(shape.clone(), material)),
                 ..RigidBodyDesc::new(pose.position + pose.rotation() * at, mass, shape.inertia(mass))
             };
             world.add_rigid_body(desc).inspect(|&body| added.push(body))
         };
-        let chassis = add_body(&chassis_shape, p.chassis_mass, p.chassis_friction, rest[0])?;
-        let mut add_wheel = |at: DVec3| add_body(&wheel_shape, p.wheel_mass, p.tyre_friction, at);
+        let chassis = add_body(&chassis_shape, p.chassis_mass, material::chassis(p.chassis_friction), rest[0])?;
+        let mut add_wheel = |at: DVec3| add_body(&wheel_shape, p.wheel_mass, material::tyre(p.tyre_friction), at);
         let wheels = [add_wheel(rest[1])?, add_wheel(rest[2])?, add_wheel(rest[3])?, add_wheel(rest[4])?];
 
         let mut add_axle = |wheel: Wheel| {

@@ -62,6 +62,13 @@ const BAD: &[(&str, &str, &[&str])] = &[
     ("max_players = 64", "", &["missing field `max_players`"]),
     ("friction = 1.0", "friction = -0.5", &["materials.asphalt.friction is -0.5", "0 to 5"]),
     ("friction = 1.0", "friction = inf", &["materials.asphalt.friction is inf", "0 to 5"]),
+    ("friction = 1.0", "friction = 1.0\nrestitution = 1.5", &["materials.asphalt.restitution is 1.5", "0 to 1"]),
+    (
+        "friction = 1.0",
+        "friction = 1.0\nrolling_resistance = nan",
+        &["materials.asphalt.rolling_resistance is NaN", "0 to 1 m"],
+    ),
+    ("[materials.asphalt]", "[materials.tyre]", &["materials is \"tyre\"", "other than chassis and tyre"]),
     ("friction = 1.0", "friction = \"much\"", &["line 8, column 12", "invalid type: string \"much\""]),
     ("material = \"asphalt\"", "material = \"ice\"", &["statics[0].material is ice", "one of asphalt"]),
     (
@@ -107,6 +114,19 @@ fn assert_refused<'a>(files: impl Iterator<Item = (String, &'a str, &'a [&'a str
 
 /// Text behind the flat arena's file, and what the error has to say.
 const BAD_ADDITIONS: &[(&str, &[&str])] = &[
+    (
+        "[[material_pairs]]\nbetween = [\"asphalt\", \"ice\"]\ncontact.friction = 0.1",
+        &["material_pairs[0].between[1] is ice", "one of chassis, tyre, asphalt"],
+    ),
+    (
+        "[[material_pairs]]\nbetween = [\"asphalt\", \"tyre\"]\ncontact.friction = 9",
+        &["material_pairs[0].contact.friction is 9", "0 to 5"],
+    ),
+    (
+        "[[material_pairs]]\nbetween = [\"asphalt\", \"tyre\"]\ncontact.friction = 1\n\
+         [[material_pairs]]\nbetween = [\"tyre\", \"asphalt\"]\ncontact.friction = 2",
+        &["material_pairs[1].between is tyre, asphalt", "no entry yet"],
+    ),
     ("[vehicle]\nchassis_mass = 0", &["vehicle.chassis_mass is 0", "50 to 50000 kg"]),
     ("[vehicle]\nwheel_rounding = 0.5", &["vehicle.wheel_rounding is 0.5", "0 to 0.108 m"]),
     ("[vehicle]\ntrack = 5\nwheelbase = 1", &["vehicle.steer_max_deg is 35", "0 to 19 deg"]),

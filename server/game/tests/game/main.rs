@@ -1,6 +1,7 @@
 //! Tests of the game through its public interface: one binary, a module a subject.
 
 mod arena_files;
+mod collisions;
 mod driving;
 mod handling;
 mod pipeline;

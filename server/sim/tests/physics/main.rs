@@ -3,6 +3,7 @@
 mod articulated;
 mod closed_form;
 mod collisions;
+mod contact_events;
 mod determinism;
 mod elasticity;
 mod hostile;
