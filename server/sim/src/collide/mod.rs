@@ -7,6 +7,8 @@ mod broad_phase;
 mod collision;
 mod groups;
 mod half_space;
+pub mod kdop;
+pub mod kdop_tree;
 mod manifold;
 mod material;
 mod narrow_phase;
