@@ -1,18 +1,19 @@
 //! Collision detection: which DOF are incompatible, and where.
 //!
-//! Once a tick, at Q0, with margins that cover the tick's motion: `broad_phase` prunes, `narrow_phase` finds the
+//! Once a tick, at Q0, with margins that cover the tick's motion: three `trees` of k-DOPs prune, `narrow_phase` finds the
 //! points. What comes out are contact points; [`potential::contact`](crate::potential) makes potentials of them.
 
-mod broad_phase;
 mod collision;
 mod groups;
 mod half_space;
+mod hull;
 pub mod kdop;
 pub mod kdop_tree;
 mod manifold;
 mod material;
 mod narrow_phase;
 mod shape;
+mod trees;
 
 use std::collections::BTreeMap;
 
@@ -26,10 +27,12 @@ pub use shape::{Collider, HULL_POINTS_MAX, Shape};
 use crate::dof::{BodyId, Placed, Pose, Twist};
 use crate::error::{SimError, require_rotation, require_vector};
 use crate::settings::Settings;
-use broad_phase::{Bounds, BroadPhase};
 use collision::{Closest, Touch};
+pub(crate) use hull::Bodies;
+use kdop::Kdop;
 use material::MaterialTable;
 use narrow_phase::NarrowPhase;
+use trees::Trees;
 
 slotmap::new_key_type! {
     /// Handle of a piece of static geometry.
@@ -128,11 +131,18 @@ impl ContactPoint {
     }
 }
 
+/// Slabs of the engine's k-DOPs.
+const SLABS: usize = 7;
+
+/// What bounds a hull, or a piece of static geometry.
+type Bound = Kdop<SLABS>;
+
 struct Static {
     serial: u32,
     collider: Collider,
     pose: Pose,
-    bounds: Bounds,
+    /// In the static tree; none for a half-space, which has no bounds.
+    piece: Option<u32>,
 }
 
 /// The collision stage.
@@ -145,10 +155,10 @@ pub(crate) struct Detector {
     materials: MaterialTable,
     /// Pairs of bodies that never collide, by serial, smaller first; sorted, and once for every reason.
     excluded: Vec<(u32, u32)>,
-    broad_phase: BroadPhase,
+    trees: Trees,
+    /// Half-spaces, in order of serial.
+    unbounded: Vec<StaticId>,
     narrow_phase: NarrowPhase,
-    bounds: Vec<Bounds>,
-    pairs: Vec<(u32, u32)>,
     /// Contacts of this tick, in order of pair.
     pub contacts: Vec<ContactPoint>,
     /// What there is to tell of pairs in this tick, in order of pair.
@@ -164,11 +174,17 @@ impl Detector {
         let collider = desc.collider;
         collider.validate()?;
         let pose = Pose { position: desc.position, rotation: desc.rotation.normalize() };
-        let half = collider.shape().half_extents(pose.rotation);
-        let bounds = Bounds { min: pose.position - half, max: pose.position + half };
         let serial = self.static_serials;
         self.static_serials += 1;
-        let id = self.statics.insert(Static { serial, collider, pose, bounds });
+        let bounds = match collider.shape() {
+            Shape::HalfSpace { .. } => None,
+            shape => Some(hull::bounds(shape, pose)),
+        };
+        let id = self.statics.insert(Static { serial, collider, pose, piece: None });
+        match bounds {
+            Some(bounds) => self.statics[id].piece = Some(self.trees.add_fixed(id, serial, bounds)),
+            None => self.unbounded.push(id),
+        }
         self.static_ids.insert(serial, id);
         Ok(id)
     }
@@ -177,6 +193,10 @@ impl Detector {
     pub fn remove_static(&mut self, id: StaticId) -> bool {
         let Some(piece) = self.statics.remove(id) else { return false };
         self.static_ids.remove(&piece.serial);
+        match piece.piece {
+            Some(key) => self.trees.remove_fixed(key),
+            None => self.unbounded.retain(|&other| other != id),
+        }
         let partner = Partner::Static(piece.serial);
         self.contacts.retain(|contact| contact.b != partner);
         self.narrow_phase.forget(|(_, b)| b == partner);
@@ -242,14 +262,20 @@ impl Detector {
         }
     }
 
-    fn excludes(&self, a: u32, b: u32) -> bool {
-        self.excluded.binary_search(&(a.min(b), a.max(b))).is_ok()
+    /// Takes a collider of the body with serial `owner` in. Answers what detection calls it.
+    pub fn add(&mut self, placed: Placed, owner: u32) -> u32 {
+        self.trees.add(placed, owner)
     }
 
-    /// Forgets a body: its contacts and exclusions.
-    pub fn forget(&mut self, serial: u32) {
+    /// Forgets a collider and its contacts.
+    pub fn remove(&mut self, placed: &Placed) {
+        self.trees.remove(placed.hull);
+        self.forget_contacts(placed.serial);
+    }
+
+    /// Forgets a body's exclusions.
+    pub fn forget_exclusions(&mut self, serial: u32) {
         self.excluded.retain(|&(a, b)| a != serial && b != serial);
-        self.forget_contacts(serial);
     }
 
     /// Forgets a body's contacts.
@@ -258,55 +284,45 @@ impl Detector {
         self.narrow_phase.forget(|(a, b)| a == serial || b == Partner::Body(serial));
     }
 
-    /// Finds all contact points of the colliders `bodies`, which are in order of serial. `look` answers `None` for what does not
-    /// collide.
-    pub fn detect<'a>(&mut self, bodies: &[Placed], settings: &Settings, look: impl Fn(&Placed) -> Option<Moving<'a>>) {
-        self.bounds.clear();
-        let bounds = |placed: &Placed| look(placed).map_or(Bounds::EMPTY, |body| swept_bounds(&body, settings));
-        self.bounds.extend(bodies.iter().map(bounds));
-        self.broad_phase.pairs(&self.bounds, &mut self.pairs);
+    /// Finds all contact points.
+    pub fn detect(&mut self, bodies: Bodies, settings: &Settings) {
+        self.trees.update(bodies, settings);
         self.narrow_phase.begin();
-        let mut pairs = self.pairs.iter().peekable();
-        for (i, placed) in (0..).zip(bodies) {
-            while pairs.next_if(|&&(a, _)| a < i).is_some() {}
-            let Some(body) = &look(placed) else { continue };
-            while let Some(&(_, j)) = pairs.next_if(|&&(a, _)| a == i) {
-                let Some(other) = &look(&bodies[j as usize]) else { continue };
-                let meet = body.owner != other.owner && body.collider.meets(other.collider);
-                if meet && !self.excludes(body.owner, other.owner) {
-                    let surface = self.materials.contact(body.collider.material(), other.collider.material());
-                    self.narrow_phase.bodies(body, other, surface, settings);
-                }
-            }
-            for piece in self.statics.values() {
-                if piece.bounds.overlaps(&self.bounds[i as usize]) && body.collider.meets(&piece.collider) {
-                    let surface = self.materials.contact(body.collider.material(), piece.collider.material());
-                    let at = (piece.serial, &piece.collider, piece.pose);
-                    self.narrow_phase.with_static(body, at, surface, settings);
-                }
-            }
-        }
+        self.meet_bodies(bodies, settings);
+        self.meet_statics(bodies, settings);
         self.contacts.clear();
         self.touches.clear();
         self.detections += 1;
         self.narrow_phase.finish(&mut self.contacts, &mut self.touches, settings);
     }
 
+    /// The fine phase of all pairs of bodies that may touch.
+    fn meet_bodies(&mut self, bodies: Bodies, settings: &Settings) {
+        let excludes = |a: u32, b: u32| self.excluded.binary_search(&(a.min(b), a.max(b))).is_ok();
+        for pair in self.trees.pairs() {
+            let [Some(a), Some(b)] = pair.map(|hull| hull.moving(bodies)) else { continue };
+            if a.collider.meets(b.collider) && !excludes(a.owner, b.owner) {
+                let surface = self.materials.contact(a.collider.material(), b.collider.material());
+                self.narrow_phase.bodies(&a, &b, surface, settings);
+            }
+        }
+    }
+
+    /// The fine phase of all bodies with the static geometry that they may touch.
+    fn meet_statics(&mut self, bodies: Bodies, settings: &Settings) {
+        let unbounded = self.trees.awake().flat_map(|hull| self.unbounded.iter().map(move |&id| (hull, id)));
+        for (hull, id) in self.trees.pairs_with_fixed().chain(unbounded) {
+            let (Some(body), piece) = (hull.moving(bodies), &self.statics[id]) else { continue };
+            if body.collider.meets(&piece.collider) {
+                let surface = self.materials.contact(body.collider.material(), piece.collider.material());
+                let at = (piece.serial, &piece.collider, piece.pose);
+                self.narrow_phase.with_static(&body, at, surface, settings);
+            }
+        }
+    }
+
     /// Remembers what the friction springs and normal forces of `contacts` became.
     pub fn remember(&mut self) {
         self.narrow_phase.remember(&self.contacts);
     }
-}
-
-/// Bounds of a body and of all that a tick may do to it.
-fn swept_bounds(body: &Moving, settings: &Settings) -> Bounds {
-    let half = body.collider.shape().half_extents(body.pose.rotation);
-    let sweep = settings.dt * body.twist.linear;
-    let slack = settings.contact.margin + settings.dt * settings.dt * settings.gravity.length();
-    // Turning moves no point of the body farther than its bounding ball reaches beyond its present box.
-    let turn = settings.dt * body.twist.angular.length() * body.collider.bounding_radius();
-    let turn = DVec3::splat(turn).min(DVec3::splat(body.collider.bounding_radius()) - half).max(DVec3::ZERO);
-    let reach = half + turn + slack;
-    let ends = [body.pose.position, body.pose.position + sweep];
-    Bounds { min: ends[0].min(ends[1]) - reach, max: ends[0].max(ends[1]) + reach }
 }

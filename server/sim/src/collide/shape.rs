@@ -110,23 +110,24 @@ impl Shape {
         }
     }
 
-    /// Half extents of the world-axis box around the turned shape, centred on the body.
-    pub(crate) fn half_extents(&self, rotation: DQuat) -> DVec3 {
-        let axes = glam::DMat3::from_quat(rotation);
-        match self {
-            Self::HalfSpace { .. } => DVec3::splat(f64::INFINITY),
-            Self::Ball { radius } => DVec3::splat(*radius),
-            Self::Box { half } => axes.x_axis.abs() * half.x + axes.y_axis.abs() * half.y + axes.z_axis.abs() * half.z,
-            Self::Capsule { half_length, radius } => axes.x_axis.abs() * *half_length + *radius,
-            Self::Cylinder { half_length, radius, .. } => {
-                let along = axes.z_axis;
-                let across = (DVec3::ONE - along * along).max(DVec3::ZERO);
-                along.abs() * *half_length + DVec3::new(across.x.sqrt(), across.y.sqrt(), across.z.sqrt()) * *radius
+    /// Least and greatest coordinate along a unit vector in the body's frame: the support map both ways, m.
+    pub(crate) fn interval(&self, direction: DVec3) -> (f64, f64) {
+        let half = match self {
+            Self::HalfSpace { .. } => f64::INFINITY,
+            Self::Ball { radius } => *radius,
+            Self::Box { half } => direction.abs().dot(*half),
+            Self::Capsule { half_length, radius } => direction.x.abs() * half_length + radius,
+            Self::Cylinder { half_length, radius, rounding } => {
+                let (along, across) = (direction.z.abs(), direction.x.hypot(direction.y));
+                along * (half_length - rounding) + across * (radius - rounding) + rounding
             }
             Self::Hull { points, radius } => {
-                points.iter().fold(DVec3::ZERO, |box_, &p| box_.max((axes * p).abs())) + *radius
+                let heights = points.iter().map(|p| p.dot(direction));
+                let ends = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+                return (ends.0 - radius, ends.1 + radius);
             }
-        }
+        };
+        (-half, half)
     }
 
     /// The same shape as parry knows it. Parry's cylinders stand along y: see [`Shape::parry_rotation`].

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 
 use super::interface::{BLOCK_RATES_MAX, Dof, Inertia, LocalState, PartPoint};
-use super::{Motion, Pose};
+use super::Motion;
 use crate::collide::Collider;
 use crate::elimination::minimum_degree;
 use crate::error::{LARGEST, SimError, require};
@@ -105,12 +105,6 @@ impl FigureBody {
         let rods = vec![Memory::default(); desc.dof.rods().len()];
         let ranks = minimum_degree(desc.dof.blocks().len(), &couplings(&*desc.dof, &desc.q));
         Self { controls, change, masses, ranks, mass, rods, dof: desc.dof, colliders: desc.colliders }
-    }
-
-    /// Pose of the frame at a material point.
-    pub fn pose(&self, at: PartPoint, q: &[f64], v: &[f64]) -> Pose {
-        let frame = self.dof.frame(at, q, v);
-        Pose { position: frame.position.into(), rotation: DQuat::from_mat3(&frame.rotation.value()).normalize() }
     }
 
     /// Energy that its own potentials hold, J.

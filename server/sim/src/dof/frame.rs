@@ -1,9 +1,9 @@
 //! Frame: where a point of a body is, how the body is turned there, and how both move. The one thing that potentials see
 //! of any kind of DOF.
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
-use super::Twist;
+use super::{Pose, Twist};
 use crate::autodiff::{Dual, Mat3, Scalar, Vec3};
 
 /// A frame at a state.
@@ -50,6 +50,11 @@ impl Frame<f64> {
     /// World position of a point of the frame, m.
     pub fn place(&self, local: DVec3) -> DVec3 {
         (self.position + self.arm(local)).into()
+    }
+
+    /// Where it is, and how it is turned.
+    pub(crate) fn pose(&self) -> Pose {
+        Pose { position: self.position.into(), rotation: DQuat::from_mat3(&self.rotation.value()).normalize() }
     }
 
     /// Velocity and angular velocity.

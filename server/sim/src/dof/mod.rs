@@ -131,6 +131,8 @@ pub(crate) struct Placed {
     pub at: PartPoint,
     /// Among the figure's colliders.
     pub index: u32,
+    /// What detection calls it.
+    pub hull: u32,
 }
 
 /// Index of a body that does not take part.
@@ -303,7 +305,9 @@ impl Body {
     pub fn pose(&self, state: &State) -> Pose {
         let q = state.q(self.slice);
         match (&self.figure, self.kind) {
-            (Some(figure), _) => figure.pose(PartPoint { part: 0, point: DVec3::ZERO }, q, state.v(self.slice)),
+            (Some(figure), _) => {
+                figure.dof.frame(PartPoint { part: 0, point: DVec3::ZERO }, q, state.v(self.slice)).pose()
+            }
             (None, DofKind::Particle) => Pose { position: particle::position(q), ..Pose::IDENTITY },
             (None, _) => rigid_body::pose(q),
         }

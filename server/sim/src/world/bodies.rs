@@ -51,7 +51,7 @@ impl World {
             // The first collider is found under the body's own serial.
             let serial = self.serials - u32::from(index == 0);
             self.serials = serial + 1;
-            self.placed.push(Placed { serial, body: id, at: part.at, index });
+            self.place(Placed { serial, body: id, at: part.at, index, hull: ABSENT });
         }
         let body = &mut self.bodies[id];
         body.figure = Some(figure);
@@ -66,9 +66,9 @@ impl World {
         self.state.free(body.slice);
         self.order.retain(|&other| other != id);
         self.potentials.remove_body(id);
-        self.detector.forget(body.serial);
+        self.detector.forget_exclusions(body.serial);
         let Self { placed, detector, .. } = self;
-        placed.iter().filter(|placed| placed.body == id).for_each(|placed| detector.forget_contacts(placed.serial));
+        placed.iter().filter(|placed| placed.body == id).for_each(|placed| detector.remove(placed));
         placed.retain(|placed| placed.body != id);
         true
     }
@@ -104,9 +104,15 @@ impl World {
         self.order.push(id);
         if has_collider {
             let at = PartPoint { part: 0, point: DVec3::ZERO };
-            self.placed.push(Placed { serial, body: id, at, index: 0 });
+            self.place(Placed { serial, body: id, at, index: 0, hull: ABSENT });
         }
         id
+    }
+
+    /// Puts a collider on a body.
+    fn place(&mut self, placed: Placed) {
+        let hull = self.detector.add(placed, self.bodies[placed.body].serial);
+        self.placed.push(Placed { hull, ..placed });
     }
 
     /// Adds a piece of static geometry.

@@ -2,7 +2,7 @@
 //! they are made of.
 
 use super::World;
-use crate::collide::{Collision, CollisionId, ContactView, MaterialId, Partner, Surface};
+use crate::collide::{Bodies, Collision, CollisionId, ContactView, MaterialId, Partner, Surface};
 use crate::dof::{BodyId, Placed};
 use crate::error::SimError;
 
@@ -22,13 +22,9 @@ impl World {
     /// stage 3 to judge.
     pub fn collisions(&self) -> impl Iterator<Item = Collision> + '_ {
         self.detector.collisions(|serial| {
-            let Placed { body: id, index, .. } = *self.placed(serial)?;
-            let body = &self.bodies[id];
-            let collider = match &body.figure {
-                Some(figure) => &figure.colliders[index as usize].collider,
-                None => body.collider.as_ref()?,
-            };
-            Some((id, collider))
+            let placed = self.placed(serial)?;
+            let bodies = Bodies { bodies: &self.bodies, state: &self.state };
+            Some((placed.body, bodies.collider(placed)?))
         })
     }
 

@@ -10,7 +10,7 @@ mod state;
 
 use slotmap::SlotMap;
 
-use crate::collide::{Detector, Moving};
+use crate::collide::{Bodies, Detector};
 use crate::dof::{Body, BodyId, Placed};
 use crate::error::SimError;
 use crate::integrate::{Integrator, Scene, StepReport};
@@ -67,27 +67,7 @@ impl World {
 
     /// Stage 2: finds contacts at Q0.
     pub fn detect_collisions(&mut self) {
-        let Self { bodies, state, placed, detector, settings, .. } = self;
-        detector.detect(placed, settings, |&Placed { serial, body, at, index }| {
-            let body = &bodies[body];
-            if body.quarantined {
-                return None;
-            }
-            let owner = body.serial;
-            if let Some(figure) = &body.figure {
-                let (q, v) = (state.q(body.slice), state.v(body.slice));
-                let (pose, twist) = (figure.pose(at, q, v), figure.dof.frame(at, q, v).twist());
-                return Some(Moving {
-                    serial,
-                    owner,
-                    collider: &figure.colliders[index as usize].collider,
-                    pose,
-                    twist,
-                });
-            }
-            let collider = body.collider.as_ref()?;
-            Some(Moving { serial, owner, collider, pose: body.pose(state), twist: body.twist(state) })
-        });
+        self.detector.detect(Bodies { bodies: &self.bodies, state: &self.state }, &self.settings);
     }
 
     /// Stage 4: integrates all DOF over one tick.

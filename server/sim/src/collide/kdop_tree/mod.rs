@@ -137,6 +137,11 @@ impl<const H: usize> KdopTree<H> {
         self.refit_changed();
     }
 
+    /// Whether there is anything to search for: a leaf has come or changed since [`KdopTree::settle`].
+    pub fn has_changed(&self) -> bool {
+        !self.changed.is_empty()
+    }
+
     /// From now on nothing counts as changed.
     pub fn settle(&mut self) {
         for node in self.changed.drain(..) {
