@@ -9,7 +9,7 @@ use crate::potential::gravity::Gravity;
 /// Parameters of a [`World`](crate::World).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Length of a tick, s. Positive, at most 1.
+    /// Length of a tick, s, 1e-6 to 1.
     pub dt: f64,
     /// Gravity, m/s².
     pub gravity: DVec3,
@@ -83,22 +83,24 @@ impl Settings {
     /// [`SimError::OutOfRange`] for the first setting that is.
     pub fn validate(&self) -> Result<(), SimError> {
         let (solver, contact) = (&self.solver, &self.contact);
-        require(self.dt > 0.0 && self.dt <= 1.0, "dt", self.dt, "above 0, at most 1 s")?;
+        require((1e-6..=1.0).contains(&self.dt), "dt", self.dt, "1e-6 to 1 s")?;
         require_vector(self.gravity, "gravity")?;
         require((1..=64).contains(&self.threads), "threads", self.threads as f64, "1 to 64")?;
-        require(solver.tolerance > 0.0, "solver.tolerance", solver.tolerance, "above 0 m/s²")?;
+        require((1e-15..=1e3).contains(&solver.tolerance), "solver.tolerance", solver.tolerance, "1e-15 to 1000 m/s²")?;
         let iterations = solver.iterations();
         require((1..=100_000).contains(&iterations), "solver.iterations", iterations as f64, "1 to 100000")?;
         require((1e-12..1.0).contains(&solver.forcing), "solver.forcing", solver.forcing, "1e-12 to below 1")?;
         let relaxes = solver.relaxation > 0.0 && solver.relaxation < 2.0;
         require(relaxes, "solver.relaxation", solver.relaxation, "above 0, below 2")?;
         require((1..=1000).contains(&solver.sweeps), "solver.sweeps", solver.sweeps as f64, "1 to 1000")?;
-        require(solver.joint_stiffness > 0.0, "solver.joint_stiffness", solver.joint_stiffness, "above 0")?;
-        require(contact.normal_stiffness > 0.0, "contact.normal_stiffness", contact.normal_stiffness, "above 0")?;
-        require(contact.tangent_stiffness > 0.0, "contact.tangent_stiffness", contact.tangent_stiffness, "above 0")?;
-        require(contact.transition > 0.0, "contact.transition", contact.transition, "above 0 m")?;
-        require(contact.recovery_speed >= 0.0, "contact.recovery_speed", contact.recovery_speed, "0 m/s or more")?;
-        require(contact.margin >= 0.0, "contact.margin", contact.margin, "0 m or more")
+        let stiff = |value: f64, what| require((1e-3..=1e9).contains(&value), what, value, "0.001 to 1e9");
+        stiff(solver.joint_stiffness, "solver.joint_stiffness")?;
+        stiff(contact.normal_stiffness, "contact.normal_stiffness")?;
+        stiff(contact.tangent_stiffness, "contact.tangent_stiffness")?;
+        let ContactSettings { transition, recovery_speed, margin, .. } = *contact;
+        require((1e-9..=1.0).contains(&transition), "contact.transition", transition, "1e-9 to 1 m")?;
+        require((0.0..=1e3).contains(&recovery_speed), "contact.recovery_speed", recovery_speed, "0 to 1000 m/s")?;
+        require((0.0..=10.0).contains(&margin), "contact.margin", margin, "0 to 10 m")
     }
 }
 

@@ -8,7 +8,7 @@ use super::interface::{BLOCK_RATES_MAX, Dof, Inertia, LocalState, PartPoint};
 use super::Motion;
 use crate::collide::Collider;
 use crate::elimination::minimum_degree;
-use crate::error::{LARGEST, SimError, require};
+use crate::error::{LARGEST, SimError, require, require_vector};
 use crate::integrate::figure::part_momentum;
 use crate::potential::hold::Memory;
 
@@ -82,11 +82,23 @@ impl FigureDesc {
             if !points {
                 return Err(SimError::Unusable { what: "point masses need blocks of three coordinates, one a mass" });
             }
+            if masses.off_diagonal.iter().any(|&(i, j, _)| i <= j || i as usize >= blocks.len()) {
+                return Err(SimError::Unusable {
+                    what: "a mass between points needs two of them, the later one first",
+                });
+            }
+            if self.dof.rods().iter().any(|rod| rod.points.iter().any(|&point| point as usize >= blocks.len())) {
+                return Err(SimError::Unusable { what: "a rod is at a point that the body does not have" });
+            }
+        }
+        if let Inertia::Parts(parts) = self.dof.inertia() {
+            require(parts.len() == self.dof.parts() as usize, "inertias", parts.len() as f64, "one for every part")?;
         }
         for &m in &masses(&*self.dof, &self.q) {
             require(m > 0.0 && m < LARGEST, "mass of a coordinate", m, "above 0, below 1e9 kg or kg m²")?;
         }
         for part in &self.colliders {
+            require_vector(part.at.point, "place of a collider")?;
             require(part.at.part < self.dof.parts(), "part of a collider", f64::from(part.at.part), "a part's index")?;
             part.collider.validate_moving()?;
         }

@@ -46,9 +46,10 @@ impl FiniteElements {
     /// A body of a mesh. The nodes `fixed` stay where the mesh has them.
     ///
     /// # Errors
-    /// [`SimError`] naming an element that is inside out or flat (where the mesh was scaled since it was checked), the
+    /// [`SimError`] naming a constant of the material that is out of range, an element that is inside out or flat (where the mesh was scaled since it was checked), the
     /// density where it is not above 0, or a fixed node that does not exist; and where every node is fixed.
     pub fn new(mesh: &TetrahedralMesh, material: Elastic, density: Density, fixed: &[u32]) -> Result<Self, SimError> {
+        material.validate()?;
         let (places, moving) = places(mesh.nodes().len(), fixed)?;
         let mut rest = vec![DVec3::ZERO; mesh.nodes().len()];
         mesh.nodes().iter().zip(&places).for_each(|(&node, &place)| rest[place as usize] = node);

@@ -26,6 +26,12 @@ use crate::error::{LARGEST, SimError, require, require_vector};
 use crate::potential::outer;
 use integrals::Integrals;
 
+/// Least mass of a solid, kg: below, products of its numbers vanish.
+const LEAST_MASS: f64 = 1e-30;
+
+/// Mass that a solid must be below, kg: above, products of its numbers overflow.
+const LARGEST_MASS: f64 = 1e30;
+
 /// Density of a solid, kg/m³: constant, or affine in position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Density {
@@ -75,21 +81,20 @@ impl MassProperties {
     /// Of a point mass.
     ///
     /// # Errors
-    /// [`SimError`] where the mass is not above 0, or the point not finite.
+    /// [`SimError`] where the mass is out of range, or the point not finite.
     pub fn of_point(mass: f64, at: DVec3) -> Result<Self, SimError> {
-        require(mass > 0.0, "mass", mass, "above 0 kg")?;
         require_vector(at, "position of a point mass")?;
-        Ok(Self { mass, centre: at, moments: DMat3::ZERO })
+        Self { mass, centre: at, moments: DMat3::ZERO }.checked()
     }
 
     /// Of several solids taken together; where they overlap, both count.
     ///
     /// # Errors
-    /// [`SimError::Unusable`] where there is none.
+    /// [`SimError::Unusable`] where there is none, [`SimError::OutOfRange`] where the sum is.
     pub fn combined(parts: impl IntoIterator<Item = Self>) -> Result<Self, SimError> {
         let mut parts = parts.into_iter();
         let first = parts.next().ok_or(SimError::Unusable { what: "a body of no parts has no mass" })?;
-        Ok(parts.fold(first, Self::with))
+        parts.fold(first, Self::with).checked()
     }
 
     /// Of both together. Differences of centres only: nothing is lost far from the origin.
@@ -112,10 +117,9 @@ impl MassProperties {
     /// Of the same solid with every density multiplied such that it weighs `mass` kg.
     ///
     /// # Errors
-    /// [`SimError`] where `mass` is not above 0.
+    /// [`SimError`] where `mass` is out of range.
     pub fn scaled_to(self, mass: f64) -> Result<Self, SimError> {
-        require(mass > 0.0, "mass", mass, "above 0 kg")?;
-        Ok(Self { mass, centre: self.centre, moments: self.moments * (mass / self.mass) })
+        Self { mass, centre: self.centre, moments: self.moments * (mass / self.mass) }.checked()
     }
 
     /// Tensor of inertia about the centre of mass, kg m².
@@ -138,10 +142,19 @@ impl MassProperties {
         (sums, DQuat::from_mat3(&axes).normalize())
     }
 
-    fn from_integrals(about: DVec3, integrals: Integrals) -> Self {
+    fn from_integrals(about: DVec3, integrals: Integrals) -> Result<Self, SimError> {
         let Integrals { mass, first, second } = integrals;
         let arm = first / mass;
-        Self { mass, centre: about + arm, moments: second - outer(arm, arm) * mass }
+        Self { mass, centre: about + arm, moments: second - outer(arm, arm) * mass }.checked()
+    }
+
+    /// `Err` where numbers have overflown, or are so small that nothing is left of them.
+    fn checked(self) -> Result<Self, SimError> {
+        require((LEAST_MASS..LARGEST_MASS).contains(&self.mass), "mass", self.mass, "1e-30 to below 1e30 kg")?;
+        require(self.centre.is_finite(), "centre of mass", self.centre.length(), "finite")?;
+        let sum: f64 = self.moments.to_cols_array().iter().map(|moment| moment.abs()).sum();
+        require(sum.is_finite(), "second moments", sum, "finite")?;
+        Ok(self)
     }
 }
 

@@ -73,7 +73,7 @@ impl Polyhedron {
     /// [`SimError`] naming the density.
     pub fn mass_properties(&self, density: Density) -> Result<MassProperties, SimError> {
         self.require_positive(density)?;
-        Ok(MassProperties::from_integrals(self.middle, self.integrals(density)))
+        MassProperties::from_integrals(self.middle, self.integrals(density))
     }
 
     /// `Err` unless the density is positive at every point.

@@ -54,7 +54,7 @@ impl Shape {
         let (first, second) = (DVec3::ZERO, DMat3::from_diagonal(squares));
         let moments = VolumeMoments { volume, first, second, third: DMat3::ZERO };
         let integrals = moments.weighed(density.at_origin, density.gradient);
-        Ok(MassProperties::from_integrals(DVec3::ZERO, integrals))
+        MassProperties::from_integrals(DVec3::ZERO, integrals)
     }
 
     /// How far the shape reaches from the origin along a unit direction, m.
@@ -78,7 +78,7 @@ fn hull(points: &[DVec3], radius: f64, density: Density) -> Result<MassPropertie
     let hull = Polyhedron::of_hull(points)?;
     let core = hull.integrals(density);
     let shell = if radius > 0.0 { rounding::shell(&hull, radius, density)? } else { Integrals::ZERO };
-    Ok(MassProperties::from_integrals(hull.middle(), core + shell))
+    MassProperties::from_integrals(hull.middle(), core + shell)
 }
 
 /// Volume, m³, and ∫x², ∫y², ∫z², m⁵.

@@ -51,6 +51,10 @@ pub(crate) struct PdGains {
     pub damping: f64,
 }
 
+/// Bound of gains, per kg and tick: a faster mode that a tick shrinks by more is gone anyway, and numbers stay far from
+/// overflowing.
+const STIFFEST: f64 = 1e12;
+
 impl PdGains {
     /// Gains for which implicit Euler with ticks of `dt` samples the oscillator asked for (DESIGN, section 3).
     ///
@@ -63,14 +67,25 @@ impl PdGains {
         let beat_angle = omega * (1.0 - damping_ratio * damping_ratio).max(0.0).sqrt() * dt;
         let slow_enough = beat_angle < std::f64::consts::PI;
         require(slow_enough, "frequency", frequency, "less than half the tick rate, as damped")?;
-        let grown = (damping_ratio * omega * dt).exp();
-        let beat = if damping_ratio < 1.0 {
-            beat_angle.cos()
+        // A tick divides the two modes by e^a and e^b: dt² Ks = (e^a − 1)(e^b − 1) and dt Kd = e^a + e^b − 2, written
+        // such that nothing cancels where both are near 1, or one is huge.
+        let (stiffness, damping) = if damping_ratio < 1.0 {
+            let growth = damping_ratio * omega * dt;
+            let turned = 4.0 * growth.exp() * (beat_angle / 2.0).sin().powi(2);
+            (growth.exp_m1().powi(2) + turned, 2.0 * growth.exp_m1() - turned)
         } else {
-            (omega * (damping_ratio * damping_ratio - 1.0).sqrt() * dt).cosh()
+            let spread = damping_ratio + (damping_ratio * damping_ratio - 1.0).sqrt();
+            let [slow, fast] = [omega * dt / spread, omega * dt * spread].map(f64::exp_m1);
+            (slow * fast, slow + fast)
         };
-        let damping = (2.0 * grown * beat - 2.0) / dt;
-        let stiffness = (grown * grown - 1.0 - dt * damping) / (dt * dt);
+        let (stiffness, damping) = (stiffness / (dt * dt), damping / dt);
+        let firm = stiffness.max(damping / dt) * dt * dt < STIFFEST;
+        require(
+            firm,
+            "damping_ratio",
+            damping_ratio,
+            "one that shrinks the faster of both modes by less than 1e12 a tick",
+        )?;
         let reachable = "a frequency and damping ratio that this tick rate can show (damp more, or slow down)";
         require(damping >= 0.0, "damping gain", damping, reachable)?;
         require(stiffness >= 0.0, "stiffness gain", stiffness, reachable)?;
@@ -153,6 +168,16 @@ mod tests {
             }
             assert!((extreme - expected).abs() < 0.003, "{frequency} Hz: {extreme}");
         }
+        // Slow, and overdamped: Ks → ω², and the slower of the two modes is the one that the player sees.
+        let omega = std::f64::consts::TAU * 1e-6;
+        assert!((PdGains::new(1e-6, 0.5, dt).unwrap().stiffness / (omega * omega) - 1.0).abs() < 1e-6);
+        let gains = PdGains::new(2.0, 20.0, dt).unwrap();
+        let (k, c) = (gains.stiffness * dt * dt, gains.damping * dt);
+        // λ is a root of (1 + c + k) λ² − (2 + c) λ + 1; the larger one.
+        let root = ((2.0 + c) + (c * c - 4.0 * k).sqrt()) / (2.0 * (1.0 + c + k));
+        let slow = std::f64::consts::TAU * 2.0 * (20.0 - 399f64.sqrt()) * dt;
+        assert!((root.ln() + slow).abs() < 1e-9, "{} {slow}", root.ln());
+        assert!(PdGains::new(2.0, 500.0, dt).unwrap_err().to_string().contains("damping_ratio"));
         assert!(PdGains::new(5.0, 0.3, dt).unwrap_err().to_string().contains("damping gain"));
         assert!(PdGains::new(30.0, 0.5, dt).unwrap_err().to_string().contains("half the tick rate"));
     }

@@ -31,7 +31,7 @@ impl SpringDesc {
     pub(crate) fn validate(&self) -> Result<(), SimError> {
         require_vector(self.a.point, "a.point")?;
         require_vector(self.b.point, "b.point")?;
-        require(self.rest_length >= 0.0, "rest_length", self.rest_length, "0 m or more")?;
+        require((0.0..1e9).contains(&self.rest_length), "rest_length", self.rest_length, "0 to below 1e9 m")?;
         require((0.0..1e15).contains(&self.stiffness), "stiffness", self.stiffness, "0 to below 1e15 N/m")?;
         require((0.0..1e15).contains(&self.damping), "damping", self.damping, "0 to below 1e15 N s/m")
     }

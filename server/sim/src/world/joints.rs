@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::World;
 use crate::dof::{DofKind, Frame, PartPoint};
-use crate::error::SimError;
+use crate::error::{SimError, require};
 use crate::potential::alignment::Captured;
 use crate::potential::hold::Held;
 use crate::potential::limit::hinge_angle;
@@ -12,6 +12,9 @@ use crate::potential::{
     Anchor, AngleLimitDesc, AngleLimitId, DistanceLimitDesc, DistanceLimitId, Driven, FixedJointDesc, FixedJointId,
     HingeDesc, HingeId, Motor, MotorDesc, MotorId, SliderDesc, SliderId, UniversalJointDesc, UniversalJointId,
 };
+
+/// Sine of the angle below which the axes of a universal joint are taken for parallel.
+const PARALLEL: f64 = 0.01;
 
 impl World {
     /// Adds a hinge.
@@ -35,10 +38,18 @@ impl World {
     /// Adds a universal joint.
     ///
     /// # Errors
-    /// As [`World::add_hinge`].
+    /// As [`World::add_hinge`]; and where the axes are parallel as the bodies stand: nothing says which way to turn them.
     pub fn add_universal_joint(&mut self, desc: UniversalJointDesc) -> Result<UniversalJointId, SimError> {
         desc.validate()?;
         self.check_turning(desc.a, desc.b)?;
+        let [a, b] = [self.frame_at(desc.a).arm(desc.axis_a), self.frame_at(desc.b).arm(desc.axis_b)];
+        let [a, b] = [a, b].map(|axis| DVec3::from(axis).normalize_or_zero());
+        require(
+            a.cross(b).length() > PARALLEL,
+            "sine of the angle between the axes",
+            a.cross(b).length(),
+            "above 0.01",
+        )?;
         self.exclude(desc.a, desc.b);
         Ok(self.potentials.universal_joints.insert(Held::new(desc)))
     }

@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
-use pita_sim::mass::Density;
+use pita_sim::mass::{Density, MassProperties};
+use pita_sim::mesh::TetrahedralMesh;
+use pita_sim::potential::elasticity::Elastic;
 use pita_sim::{
-    Anchor, Articulated, AxleControl, AxleDesc, BallJointDesc, Collider, DQuat, DVec3, FigureDesc, JointDesc,
-    JointDrive, JointKind, JointLimit, JointMotor, PartDesc, ParticleDesc, RigidBodyDesc, Settings, Shape, SimError,
-    SpringDesc, StaticDesc, World,
+    Anchor, Articulated, AxleControl, AxleDesc, BallJointDesc, Collider, DQuat, DVec3, Dof, FigureDesc, FiniteElements,
+    JointDesc, JointDrive, JointKind, JointLimit, JointMotor, PartCollider, PartDesc, PartPoint, ParticleDesc,
+    PdControl, PdDesc, RigidBodyDesc, Settings, Shape, SimError, SpringDesc, StaticDesc, UniversalJointDesc, World,
 };
 
 use super::{DT, cube, ground, particle, world};
@@ -209,4 +211,60 @@ fn boxes_inside_one_another_do_not_explode() {
             assert!(world.velocity(id).unwrap().length() < 12.5, "{}", world.velocity(id).unwrap());
         }
     }
+}
+
+/// Settings with which products of numbers would overflow are refused, and so are materials made by hand, solids that
+/// weigh nothing or everything, and colliders nowhere.
+#[test]
+fn numbers_that_overflow_are_refused_by_name() {
+    let with = |change: fn(&mut Settings)| {
+        let mut settings = Settings::at(DT);
+        change(&mut settings);
+        World::new(settings)
+    };
+    refused(with(|s| s.dt = 1e-300), "dt is 0");
+    refused(with(|s| s.solver.tolerance = 1e300), "solver.tolerance");
+    refused(with(|s| s.solver.joint_stiffness = 1e300), "solver.joint_stiffness");
+    refused(with(|s| s.contact.normal_stiffness = f64::MAX), "contact.normal_stiffness");
+    refused(with(|s| s.contact.tangent_stiffness = 1e-300), "contact.tangent_stiffness");
+    refused(with(|s| s.contact.transition = 1e-300), "contact.transition");
+    refused(with(|s| s.contact.recovery_speed = 1e300), "contact.recovery_speed");
+    refused(with(|s| s.contact.margin = f64::MAX), "contact.margin");
+
+    let mesh = TetrahedralMesh::of_box(DVec3::ZERO, DVec3::ONE, [1, 1, 1]).unwrap();
+    let density = Density::constant(1000.0);
+    for (lambda, mu, expected) in
+        [(1e5, f64::NAN, "mu"), (1e5, -1.0, "mu"), (-1e5, 1e5, "lambda"), (1e300, 1e5, "lambda")]
+    {
+        refused(FiniteElements::new(&mesh, Elastic { lambda, mu }, density, &[]), expected);
+    }
+    refused(Shape::Ball { radius: 1e-200 }.mass_properties(density), "mass is 0");
+    refused(MassProperties::of_point(1e300, DVec3::ZERO), "mass is 1");
+
+    let mut world = world();
+    let dof: Arc<dyn Dof> =
+        Arc::new(FiniteElements::new(&mesh, Elastic::new(1e5, 0.3).unwrap(), density, &[]).unwrap());
+    let q: Vec<f64> = mesh.nodes().iter().flat_map(|node| node.to_array()).collect();
+    let at = PartPoint { part: 0, point: DVec3::NAN };
+    let colliders = vec![PartCollider { at, collider: Collider::new(Shape::Ball { radius: 0.1 }, 0.5) }];
+    refused(world.add_figure(FigureDesc { dof, v: vec![0.0; q.len()], q, colliders }), "place of a collider is NaN");
+    let ends = (Anchor::world(DVec3::ZERO), Anchor::body(cube(&mut world, DVec3::X), DVec3::ZERO));
+    let spring = SpringDesc { a: ends.0, b: ends.1, rest_length: 1e300, stiffness: 1.0, damping: 0.0 };
+    refused(world.add_spring(spring), "rest_length");
+    let parallel = UniversalJointDesc::new(ends.0, ends.1, DVec3::X, -DVec3::X);
+    refused(world.add_universal_joint(parallel), "sine of the angle between the axes is 0");
+}
+
+/// A first-order motor that is to be there at once, in a long tick.
+#[test]
+fn the_fastest_motor_of_the_longest_tick_is_finite() {
+    let mut world = World::new(Settings { gravity: DVec3::ZERO, ..Settings::at(1.0) }).unwrap();
+    let body = cube(&mut world, DVec3::ZERO);
+    let drive = JointDrive::Velocity { time_constant: 1e-3 };
+    let control = PdControl { target: DVec3::ZERO, target_velocity: DVec3::X };
+    let at = Anchor::body(body, DVec3::ZERO);
+    world.add_pd(PdDesc { at, drive, max_force: f64::INFINITY, control }).unwrap();
+    world.step();
+    assert!(!world.is_quarantined(body));
+    assert!((world.velocity(body).unwrap() - DVec3::X).length() < 1e-3, "{}", world.velocity(body).unwrap());
 }

@@ -1,5 +1,6 @@
 //! The engine against closed forms, conservation laws and itself.
 
+mod absurd;
 mod articulated;
 mod closed_form;
 mod collisions;

@@ -226,6 +226,7 @@ impl LatticeDesc {
         let count = self.cell_counts().element_product();
         let some = self.cells.iter().all(|&n| n > 0) && count <= CELLS_MAX as f64;
         require(some, "cells of the lattice", count, "1 or more each way, 4096 or fewer")?;
+        self.material.validate()?;
         require_damping(self.damping)
     }
 }

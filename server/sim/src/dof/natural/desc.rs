@@ -14,6 +14,9 @@ pub const POINTS_MAX: usize = 256;
 /// Most rods of a figure: designers enjoy over-determined systems.
 pub const RODS_MAX: usize = 4096;
 
+/// In how many points a part may be embedded.
+pub(super) const EMBEDDED_IN: &str = "a part is embedded in 1, 2 or 4 points";
+
 /// Shortest rod, m.
 const SHORTEST: f64 = 1e-6;
 
@@ -116,6 +119,9 @@ impl NaturalDesc {
     }
 
     fn check_part(&self, part: &NaturalPart) -> Result<(), SimError> {
+        if !matches!(part.points.len(), 1 | 2 | 4) {
+            return Err(SimError::Unusable { what: EMBEDDED_IN });
+        }
         for (i, &a) in part.points.iter().enumerate() {
             self.check_point(a)?;
             let (repeated, loose) =

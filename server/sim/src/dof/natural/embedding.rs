@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
+use super::desc::EMBEDDED_IN;
 use crate::dof::embedding::EmbeddedPoint;
 use crate::dof::{Columns, Frame};
 use crate::error::SimError;
@@ -53,7 +54,7 @@ impl Embedding {
                 }
                 Ok(Self::Tetrahedron { first: a, weights: edges.inverse() })
             }
-            _ => Err(SimError::Unusable { what: "a part is embedded in 1, 2 or 4 points" }),
+            _ => Err(SimError::Unusable { what: EMBEDDED_IN }),
         }
     }
 

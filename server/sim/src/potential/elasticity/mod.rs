@@ -44,6 +44,14 @@ impl Elastic {
         Ok(Self { lambda: 2.0 * mu * poisson / (1.0 - 2.0 * poisson), mu })
     }
 
+    /// `Err` unless the constants are those of a solid that resists both squeezing and shearing.
+    pub(crate) fn validate(&self) -> Result<(), SimError> {
+        require((0.1..1e12).contains(&self.mu), "mu of the material", self.mu, "0.1 to below 1e12 Pa")?;
+        let least = -2.0 / 3.0 * self.mu;
+        let resists = self.lambda > least && self.lambda < 1e14;
+        require(resists, "lambda of the material", self.lambda, "above -2/3 of mu, below 1e14 Pa")
+    }
+
     /// The talk's energy density, J/m³, and its derivative, the first Piola-Kirchhoff stress F (λ tr(D) + 2µ D), Pa, at a
     /// deformation gradient: nothing guarded.
     pub fn energy_and_stress<S: Scalar>(&self, f: &Mat3<S>) -> (S, Mat3<S>) {
