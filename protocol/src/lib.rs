@@ -1,6 +1,6 @@
 //! PITA's wire: what travels between the daemon and its clients.
 //!
-//! Owns: key expressions ([`keys`]), messages ([`message`]), their encoding and limits ([`codec`]), authentication of
+//! Owns: key expressions ([`keys`]), messages ([`message`], those of inputs in [`input`]), their encoding and limits ([`codec`]), authentication of
 //! inputs ([`seal`]) and the packing of DOF slices ([`slices`]). It does no I/O, reads no clock and knows no engine.
 //!
 //! Every byte that is decoded here is untrusted: decoding answers a [`WireError`], never panics, and allocates no more
@@ -8,6 +8,7 @@
 
 pub mod build_info;
 pub mod codec;
+pub mod input;
 pub mod keys;
 pub mod message;
 pub mod seal;

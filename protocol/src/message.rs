@@ -6,14 +6,16 @@
 use serde::{Deserialize, Serialize};
 
 use crate::codec::{Message, WireError, require};
+pub use crate::input::{
+    Controls, FATES_MAX, INPUT_FRAMES_MAX, InputAck, InputCounts, InputFate, InputFates, InputFrame, InputPacket,
+    buttons,
+};
 use crate::seal::SessionKey;
 
 /// Longest player name, bytes.
 pub const NAME_MAX: usize = 32;
 /// Longest free text in a message, bytes.
 pub const TEXT_MAX: usize = 256;
-/// Most input frames in one packet: the newest and its predecessors.
-pub const INPUT_FRAMES_MAX: usize = 8;
 
 // --- joining -------------------------------------------------------------------------------------------------------
 
@@ -250,86 +252,7 @@ fn all_finite(numbers: &[f32]) -> bool {
     numbers.iter().all(|x| x.is_finite())
 }
 
-// --- driving -------------------------------------------------------------------------------------------------------
-
-/// The state of a player's controls.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Controls {
-    /// 0 to 1.
-    pub throttle: f32,
-    /// 0 to 1.
-    pub brake: f32,
-    /// −1 (left) to 1 (right).
-    pub steer: f32,
-    /// Bit set of [`buttons`].
-    pub buttons: u16,
-}
-
-/// Bits of [`Controls::buttons`].
-pub mod buttons {
-    /// Drive backwards.
-    pub const REVERSE: u16 = 1;
-    /// Block the rear wheels.
-    pub const HANDBRAKE: u16 = 2;
-    /// Put the vehicle back on its wheels where it is.
-    pub const RESET: u16 = 4;
-}
-
-impl Controls {
-    /// # Errors
-    /// [`WireError::Content`] for a value that is not finite or out of range.
-    pub fn validate(&self) -> Result<(), WireError> {
-        require((0.0..=1.0).contains(&self.throttle), "throttle", "0 to 1")?;
-        require((0.0..=1.0).contains(&self.brake), "brake", "0 to 1")?;
-        require((-1.0..=1.0).contains(&self.steer), "steer", "-1 to 1")
-    }
-}
-
-/// Controls at one tick.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct InputFrame {
-    /// Strictly increasing within a session, from 1.
-    pub sequence: u32,
-    /// Tick for which the client meant it.
-    pub tick: u64,
-    /// The controls.
-    pub controls: Controls,
-}
-
-/// Put on [`input`](crate::Keys::input), sealed by [`seal`](crate::seal::seal).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct InputPacket {
-    /// [`JoinAccepted::epoch`] of the session.
-    pub epoch: u32,
-    /// Newest snapshot that this client has: its acknowledgement.
-    pub snapshot_tick: u64,
-    /// The client leaves; nothing follows.
-    pub leave: bool,
-    /// The newest frame last, before it those that may have been lost.
-    pub frames: Vec<InputFrame>,
-}
-
-impl Message for InputPacket {
-    const KIND: u8 = 4;
-    const MAX_BYTES: usize = 512;
-    fn validate(&self) -> Result<(), WireError> {
-        require((1..=INPUT_FRAMES_MAX).contains(&self.frames.len()), "frames", "1 to 8")?;
-        let ascending = self.frames.windows(2).all(|w| w[0].sequence < w[1].sequence);
-        require(ascending && self.frames[0].sequence > 0, "sequence", "ascending from 1")?;
-        self.frames.iter().try_for_each(|frame| frame.controls.validate())
-    }
-}
-
 // --- what happens --------------------------------------------------------------------------------------------------
-
-/// What became of a session's inputs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct InputAck {
-    /// Newest sequence that was applied; 0 before the first.
-    pub sequence: u32,
-    /// Tick at which it was applied.
-    pub tick: u64,
-}
 
 /// Put on [`snapshot`](crate::Keys::snapshot) after each tick.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -457,6 +380,12 @@ pub struct Status {
     pub memory_bytes: u64,
     /// CPU time of the whole process since its start, s.
     pub cpu_s: f64,
+    /// What became of the players' inputs, since the start.
+    pub inputs: InputCounts,
+    /// From the arrival of an input to the start of the tick that applied it, over the last inputs, ms.
+    pub input_wait_p50_ms: f64,
+    /// The same, ms.
+    pub input_wait_p99_ms: f64,
     /// What was refused, since the start.
     pub refused: RefusedCounts,
     /// Hash of the state after [`Status::tick`].

@@ -93,8 +93,8 @@ pub struct SessionLimits {
     pub input_timeout_ms: Within<500, 600_000>,
     /// After so long without input the controls are let go, ms.
     pub coast_after_ms: Within<50, 60_000>,
-    /// Input packets of one session that are looked at between two ticks.
-    pub input_packets_per_tick_max: Within<1, 1000>,
+    /// Inputs of one session that are looked at between two ticks.
+    pub inputs_per_tick_max: Within<8, 1000>,
 }
 
 /// `[report]`

@@ -129,18 +129,18 @@ fn share(config: &ServerConfig, arena: &Arena, clock: Clock) -> Result<Shared, D
     let limits = config.sessions;
     // Ranges of the configuration are within u16.
     let players = arena.max_players().min(limits.players_max.get() as u16);
-    let packets = limits.input_packets_per_tick_max.get();
+    let inputs = limits.inputs_per_tick_max.get();
     Ok(Shared::new(Start {
         keys: Keys::new(arena.name()).map_err(name_error)?,
         clock,
         tick_hz: config.tick.tick_hz.hz(),
         input_timeout_ms: limits.input_timeout_ms.get(),
-        inputs_max: (usize::from(players) * packets as usize).clamp(1, INPUTS_MAX),
+        inputs_max: (usize::from(players) * inputs as usize).clamp(1, INPUTS_MAX),
         sessions: Sessions::new(Limits {
             players,
             spectators: limits.spectators_max.get() as u16,
             input_timeout_ms: limits.input_timeout_ms.get().into(),
-            input_packets_per_tick: packets,
+            inputs_per_tick: inputs,
         }),
         description: description::describe(arena),
     }))

@@ -1,38 +1,73 @@
-//! The tick thread's side of inputs: what each player's controls are at this tick.
+//! The tick thread's side of inputs: what each player's controls are at this tick, and what became of each input.
 //!
-//! Pure, and free of allocation: time is the number of the tick, seats are as many as slots.
+//! An input waits here for the tick that it is meant for. One that is late is applied at the next tick, unless a newer
+//! one is; one that is too early is refused. Pure, and free of allocation once warm: time comes in, seats are as many
+//! as slots.
 
 use pita_game::{Command, Controls as GameControls};
-use pita_protocol::message::{Controls, InputAck, buttons};
+use pita_protocol::message::{Controls, FATES_MAX, InputAck, InputCounts, InputFate, InputFrame, buttons};
 
 use crate::inputs::Arrival;
 use crate::sessions::SessionId;
+
+/// Inputs that wait for their tick, of one player; more than [`EARLY_MAX_TICKS`], for those who send several a tick.
+const WAITING_MAX: usize = 32;
+/// An input may be meant for so many ticks ahead of the coming one: a lead of half a second and more is no connection to
+/// drive over.
+const EARLY_MAX_TICKS: u64 = 24;
 
 /// Seats of all slots.
 pub struct Drivers {
     seats: Vec<Option<Seat>>,
     coast_after_ticks: u64,
+    period_ns: u64,
+    counts: InputCounts,
+    /// How long each input applied at this tick had waited, µs.
+    waits_us: Vec<u32>,
 }
 
 struct Seat {
     epoch: u32,
     ack: InputAck,
     controls: Controls,
+    /// For ticks to come, in order of arrival.
+    waiting: Vec<Arrival>,
+    /// Newest sequence that was refused as early.
+    early: u32,
+    /// Reset was pressed in an input that was not driven; it holds until something is.
+    reset_pressed: bool,
     /// Tick of the last arrival, or of taking the seat.
     heard_tick: u64,
 }
 
+/// The tick that collects inputs.
+#[derive(Clone, Copy, Debug)]
+pub struct Now {
+    /// Its number.
+    pub tick: u64,
+    /// When it collects, ns of the daemon's clock.
+    pub ns: u64,
+}
+
 impl Drivers {
-    /// Empty seats for `slots`; who is silent for `coast_after_ticks` coasts.
-    pub fn new(slots: u16, coast_after_ticks: u64) -> Self {
-        Self { seats: (0..slots).map(|_| None).collect(), coast_after_ticks }
+    /// Empty seats for `slots`; who is silent for `coast_after_ticks` coasts. A tick is `period_ns` long.
+    pub fn new(slots: u16, coast_after_ticks: u64, period_ns: u64) -> Self {
+        let seats = (0..slots).map(|_| None).collect();
+        Self { seats, coast_after_ticks, period_ns, counts: InputCounts::default(), waits_us: Vec::new() }
     }
 
     /// A player takes the seat of its slot at `tick`.
     pub fn enter(&mut self, id: SessionId, tick: u64) {
         if let Some(seat) = self.seats.get_mut(usize::from(id.slot)) {
-            let (ack, controls) = (InputAck::default(), Controls::default());
-            *seat = Some(Seat { epoch: id.epoch, ack, controls, heard_tick: tick });
+            *seat = Some(Seat {
+                epoch: id.epoch,
+                ack: InputAck::default(),
+                controls: Controls::default(),
+                waiting: Vec::with_capacity(WAITING_MAX),
+                early: 0,
+                reset_pressed: false,
+                heard_tick: tick,
+            });
         }
     }
 
@@ -43,29 +78,42 @@ impl Drivers {
         }
     }
 
-    /// An input collected at `tick`. The newest sequence wins; what belongs to another session is ignored. A press of
-    /// reset holds until it is driven, also where a newer input of the same tick does not have it.
-    pub fn hear(&mut self, arrival: &Arrival, tick: u64) {
+    /// An input collected at `now`; what belongs to another session is ignored.
+    pub fn hear(&mut self, arrival: &Arrival, now: Now) {
         let Some(Some(seat)) = self.seats.get_mut(usize::from(arrival.id.slot)) else { return };
-        if seat.epoch != arrival.id.epoch || arrival.sequence <= seat.ack.sequence {
+        if seat.epoch != arrival.id.epoch {
             return;
         }
-        let pressed = seat.controls.buttons & buttons::RESET;
-        seat.controls = arrival.controls;
-        seat.controls.buttons |= pressed;
-        seat.ack = InputAck { sequence: arrival.sequence, tick };
-        seat.heard_tick = tick;
+        seat.heard_tick = now.tick;
+        seat.note_slack(arrival, now, self.period_ns);
+        let frame = &arrival.frame;
+        if frame.tick > now.tick.saturating_add(EARLY_MAX_TICKS) || seat.waiting.len() == WAITING_MAX {
+            seat.early = seat.early.max(frame.sequence);
+            self.counts.early += 1;
+        } else if frame.sequence <= seat.ack.sequence {
+            seat.pass_over(frame, &mut self.counts);
+        } else {
+            seat.waiting.push(*arrival);
+        }
     }
 
-    /// Appends what every player drives at `tick`. Controls hold until the next input, but reset is pressed for one
+    /// Appends what every player drives at `now`. Controls hold until the next input, but reset is pressed for one
     /// tick only, and whoever is silent for too long coasts.
-    pub fn drive(&mut self, tick: u64, into: &mut Vec<Command>) {
-        for (slot, seat) in (0u16..).zip(&mut self.seats) {
+    pub fn drive(&mut self, now: Now, into: &mut Vec<Command>) {
+        let Self { seats, counts, waits_us, .. } = self;
+        waits_us.clear();
+        for (slot, seat) in (0u16..).zip(seats) {
             let Some(seat) = seat else { continue };
-            if tick.saturating_sub(seat.heard_tick) >= self.coast_after_ticks {
+            if let Some(applied) = seat.apply_due(now, counts) {
+                let wait_us = now.ns.saturating_sub(applied.at_ns) / 1000;
+                waits_us.push(u32::try_from(wait_us).unwrap_or(u32::MAX));
+            }
+            if now.tick.saturating_sub(seat.heard_tick) >= self.coast_after_ticks {
                 seat.controls = Controls::default();
             }
-            into.push(Command::Drive { slot, controls: to_game(&seat.controls) });
+            let mut controls = to_game(&seat.controls);
+            controls.reset |= std::mem::take(&mut seat.reset_pressed);
+            into.push(Command::Drive { slot, controls });
             seat.controls.buttons &= !buttons::RESET;
         }
     }
@@ -74,6 +122,79 @@ impl Drivers {
     pub fn acks(&self, into: &mut Vec<(SessionId, InputAck)>) {
         let seats = (0u16..).zip(&self.seats).filter_map(|(slot, seat)| Some((slot, seat.as_ref()?)));
         into.extend(seats.map(|(slot, seat)| (SessionId { slot, epoch: seat.epoch }, seat.ack)));
+    }
+
+    /// What became of all inputs so far.
+    pub fn counts(&self) -> InputCounts {
+        self.counts
+    }
+
+    /// From arrival to the tick, of each input that the last tick applied, µs.
+    pub fn waits_us(&self) -> &[u32] {
+        &self.waits_us
+    }
+}
+
+impl Seat {
+    /// Measures how early the newest input came.
+    fn note_slack(&mut self, arrival: &Arrival, now: Now, period_ns: u64) {
+        if arrival.frame.sequence <= self.ack.received {
+            return;
+        }
+        // Ticks apart times period fits: what is further ahead or behind than a year is clamped.
+        let ticks = i128::from(arrival.frame.tick) - i128::from(now.tick);
+        let waited_ns = i128::from(now.ns.saturating_sub(arrival.at_ns));
+        let slack_ms = (ticks * i128::from(period_ns) + waited_ns) / 1_000_000;
+        self.ack.received = arrival.frame.sequence;
+        self.ack.slack_ms = slack_ms.clamp(i16::MIN.into(), i16::MAX.into()) as i16;
+    }
+
+    /// Applies the newest of the inputs whose tick has come; the others are passed over.
+    fn apply_due(&mut self, now: Now, counts: &mut InputCounts) -> Option<Arrival> {
+        let is_due = |arrival: &&Arrival| arrival.frame.tick <= now.tick;
+        let newest = *self.waiting.iter().filter(is_due).max_by_key(|arrival| arrival.frame.sequence)?;
+        self.acknowledge(&newest, now.tick, counts);
+        for at in (0..self.waiting.len()).rev() {
+            // Those that are due, and those meant for later although they were sent before.
+            if self.waiting[at].frame.sequence <= newest.frame.sequence {
+                let passed = self.waiting.swap_remove(at).frame;
+                if passed.sequence != newest.frame.sequence {
+                    self.pass_over(&passed, counts);
+                }
+            }
+        }
+        self.controls = newest.frame.controls;
+        Some(newest)
+    }
+
+    fn acknowledge(&mut self, applied: &Arrival, tick: u64, counts: &mut InputCounts) {
+        let (before, sequence) = (self.ack.sequence, applied.frame.sequence);
+        let late_ticks = tick - applied.frame.tick;
+        self.ack.fates.advance((sequence - before) as usize);
+        self.ack.fates.set(0, InputFate::Applied { late_ticks: u8::try_from(late_ticks).unwrap_or(u8::MAX) });
+        // Only as far as fates reach: the client chooses how far its sequence jumps.
+        for behind in 1..(sequence - before).min(FATES_MAX as u32) {
+            match sequence - behind <= self.early {
+                true => self.ack.fates.set(behind as usize, InputFate::Early),
+                false => counts.missing += 1,
+            }
+        }
+        (self.ack.sequence, self.ack.tick) = (sequence, tick);
+        match late_ticks {
+            0 => counts.in_time += 1,
+            _ => counts.late += 1,
+        }
+    }
+
+    /// An input that is not newer than the one applied. It was thought missing; now it is known to have come.
+    fn pass_over(&mut self, frame: &InputFrame, counts: &mut InputCounts) {
+        let behind = (self.ack.sequence - frame.sequence) as usize;
+        if self.ack.fates.get(behind) == Some(InputFate::Missing) {
+            counts.missing = counts.missing.saturating_sub(1);
+        }
+        self.ack.fates.set(behind, InputFate::Superseded);
+        self.reset_pressed |= frame.controls.buttons & buttons::RESET != 0;
+        counts.superseded += 1;
     }
 }
 
@@ -90,62 +211,4 @@ fn to_game(controls: &Controls) -> GameControls {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const ID: SessionId = SessionId { slot: 1, epoch: 7 };
-
-    fn arrival(sequence: u32, throttle: f32, buttons: u16) -> Arrival {
-        Arrival { id: ID, sequence, controls: Controls { throttle, buttons, ..Controls::default() } }
-    }
-
-    fn driven(drivers: &mut Drivers, tick: u64) -> (f64, bool) {
-        let mut commands = Vec::new();
-        drivers.drive(tick, &mut commands);
-        match &commands[..] {
-            [Command::Drive { slot: 1, controls }] => (controls.throttle, controls.reset),
-            other => panic!("{other:?}"),
-        }
-    }
-
-    #[test]
-    fn the_newest_input_holds_until_its_driver_has_been_silent_for_too_long() {
-        let mut drivers = Drivers::new(2, 15);
-        drivers.enter(ID, 100);
-        assert_eq!(driven(&mut drivers, 100), (0.0, false));
-        for arrival in [arrival(2, 0.5, 0), arrival(3, 1.0, 0), arrival(1, 0.25, 0)] {
-            drivers.hear(&arrival, 101);
-        }
-        assert_eq!(driven(&mut drivers, 101), (1.0, false));
-        assert_eq!(driven(&mut drivers, 115), (1.0, false));
-        assert_eq!(driven(&mut drivers, 116), (0.0, false));
-        let mut acks = Vec::new();
-        drivers.acks(&mut acks);
-        assert_eq!(acks, [(ID, InputAck { sequence: 3, tick: 101 })]);
-    }
-
-    #[test]
-    fn reset_is_pressed_for_one_tick() {
-        let mut drivers = Drivers::new(2, 15);
-        drivers.enter(ID, 1);
-        drivers.hear(&arrival(1, 0.0, buttons::RESET), 1);
-        drivers.hear(&arrival(2, 0.5, 0), 1);
-        assert_eq!(driven(&mut drivers, 1), (0.5, true));
-        assert_eq!(driven(&mut drivers, 2), (0.5, false));
-    }
-
-    #[test]
-    fn strangers_do_not_drive() {
-        let mut drivers = Drivers::new(2, 15);
-        drivers.hear(&arrival(1, 1.0, 0), 1);
-        drivers.enter(ID, 1);
-        for id in [SessionId { epoch: 6, ..ID }, SessionId { slot: 0, ..ID }, SessionId { slot: 9, ..ID }] {
-            drivers.hear(&Arrival { id, ..arrival(5, 1.0, 0) }, 1);
-        }
-        assert_eq!(driven(&mut drivers, 1), (0.0, false));
-        drivers.leave(ID.slot);
-        let mut commands = Vec::new();
-        drivers.drive(2, &mut commands);
-        assert!(commands.is_empty());
-    }
-}
+mod tests;

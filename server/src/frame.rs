@@ -6,7 +6,7 @@
 
 use crossbeam_queue::ArrayQueue;
 use pita_game::{Arena, ArenaEvent};
-use pita_protocol::message::{InputAck, TickRecord};
+use pita_protocol::message::{InputAck, InputCounts, TickRecord};
 use pita_protocol::slices;
 use pita_sim::DofKind;
 
@@ -33,6 +33,8 @@ pub struct Frame {
     pub records: Vec<TickRecord>,
     /// Acknowledgements of all players.
     pub acks: Vec<(SessionId, InputAck)>,
+    /// From arrival to the tick, of each input that the tick applied, µs.
+    pub input_waits_us: Vec<u32>,
     dof: Dof,
 }
 
@@ -49,6 +51,8 @@ pub struct Totals {
     pub quarantined: u64,
     /// Ticks of which no frame was left, because the publishing thread had all of them.
     pub frames_missed: u64,
+    /// What became of the players' inputs.
+    pub inputs: InputCounts,
 }
 
 /// Q and Q' of every slice in single precision.
@@ -92,6 +96,7 @@ impl Frame {
         self.events.clear();
         self.records.clear();
         self.acks.clear();
+        self.input_waits_us.clear();
     }
 }
 

@@ -7,7 +7,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crossbeam_queue::ArrayQueue;
-use pita_protocol::message::{Controls, InputPacket};
+use pita_protocol::message::{InputFrame, InputPacket};
 use pita_protocol::seal::{self, TAG_BYTES};
 use pita_protocol::{Message, WireError};
 
@@ -20,10 +20,10 @@ use crate::shared::Shared;
 pub struct Arrival {
     /// Whose it is.
     pub id: SessionId,
-    /// Its number in the session.
-    pub sequence: u32,
-    /// The controls.
-    pub controls: Controls,
+    /// The input.
+    pub frame: InputFrame,
+    /// When it came, ns of the daemon's clock.
+    pub at_ns: u64,
 }
 
 /// Where arrivals wait for the next tick.
@@ -84,9 +84,12 @@ fn admit(shared: &Shared, key_expr: &str, payload: &zenoh::bytes::ZBytes) -> Res
         shared.sessions().receive(slot, &packet, shared.inputs.tick(), shared.clock.ms()).map_err(Refused::Session)?;
     match received {
         Received::Left => shared.wake_publisher(),
-        Received::Input { sequence, controls } => {
-            let arrival = Arrival { id: SessionId { slot, epoch: packet.epoch }, sequence, controls };
-            shared.inputs.arrivals.push(arrival).map_err(|_| Refused::Session(InputRefusal::Flood))?;
+        Received::Inputs(fresh) => {
+            let (id, at_ns) = (SessionId { slot, epoch: packet.epoch }, shared.clock.ns());
+            for &frame in fresh {
+                let arrival = Arrival { id, frame, at_ns };
+                shared.inputs.arrivals.push(arrival).map_err(|_| Refused::Session(InputRefusal::Flood))?;
+            }
         }
     }
     Ok(())

@@ -15,11 +15,14 @@ use crate::stopwatch;
 const WINDOW_S: u64 = 10;
 /// Distance of the samples that rates are taken from, ms.
 const RATE_SAMPLE_MS: u64 = 500;
+/// Inputs of which the wait is kept: ten seconds of 32 players at 30 Hz.
+const INPUT_WAITS_MAX: usize = 9600;
 
 /// Measurements of the last ticks.
 pub struct Metrics {
     tick_hz: u16,
     records: VecDeque<TickRecord>,
+    input_waits_us: VecDeque<u32>,
     rates: VecDeque<Traffic>,
     state_hash: u64,
     bodies: u32,
@@ -43,6 +46,7 @@ impl Metrics {
         Self {
             tick_hz,
             records: VecDeque::with_capacity(TICK_RECORDS_MAX),
+            input_waits_us: VecDeque::with_capacity(INPUT_WAITS_MAX),
             rates: VecDeque::from([Traffic { at_ms: 0, sent: 0, received: 0 }]),
             state_hash: 0,
             bodies: 0,
@@ -57,6 +61,12 @@ impl Metrics {
                 self.records.pop_front();
             }
             self.records.push_back(TickRecord { clients, ..*record });
+        }
+        for &wait in &frame.input_waits_us {
+            if self.input_waits_us.len() == INPUT_WAITS_MAX {
+                self.input_waits_us.pop_front();
+            }
+            self.input_waits_us.push_back(wait);
         }
         (self.state_hash, self.bodies, self.totals) = (frame.state_hash, frame.bodies, frame.totals);
     }
@@ -86,13 +96,7 @@ impl Metrics {
     /// Median and 99th percentile of the tick time over the last ten seconds, ms; zero before the first tick.
     fn tick_percentiles_ms(&self) -> (f64, f64) {
         let window = usize::from(self.tick_hz) * WINDOW_S as usize;
-        let mut walls: Vec<u32> = self.records.iter().rev().take(window).map(|record| record.wall_us).collect();
-        walls.sort_unstable();
-        let rank = |share: f64| {
-            let index = (share * walls.len() as f64).ceil() as usize;
-            walls.get(index.saturating_sub(1)).map_or(0.0, |&us| f64::from(us) / 1000.0)
-        };
-        (rank(0.5), rank(0.99))
+        percentiles_ms(self.records.iter().rev().take(window).map(|record| record.wall_us).collect())
     }
 
     /// Bytes sent and received over the last ten seconds, bytes/s.
@@ -106,12 +110,23 @@ impl Metrics {
     }
 }
 
+/// Median and 99th percentile of times in µs, ms; zero of none.
+fn percentiles_ms(mut times_us: Vec<u32>) -> (f64, f64) {
+    times_us.sort_unstable();
+    let rank = |share: f64| {
+        let index = (share * times_us.len() as f64).ceil() as usize;
+        times_us.get(index.saturating_sub(1)).map_or(0.0, |&us| f64::from(us) / 1000.0)
+    };
+    (rank(0.5), rank(0.99))
+}
+
 /// How the daemon does now.
 pub fn status(shared: &Shared) -> Status {
     let clients = shared.sessions().count() as u32;
     let metrics = shared.metrics();
     let newest = metrics.records.back().copied().unwrap_or_default();
     let (tick_p50_ms, tick_p99_ms) = metrics.tick_percentiles_ms();
+    let (input_wait_p50_ms, input_wait_p99_ms) = percentiles_ms(metrics.input_waits_us.iter().copied().collect());
     let (sent_bytes_per_s, received_bytes_per_s) = metrics.rates_per_s();
     Status {
         version: VERSION_AND_COMMIT.to_owned(),
@@ -132,6 +147,9 @@ pub fn status(shared: &Shared) -> Status {
         received_bytes_per_s,
         memory_bytes: stopwatch::resident_bytes(),
         cpu_s: stopwatch::process_cpu_s(),
+        inputs: metrics.totals.inputs,
+        input_wait_p50_ms,
+        input_wait_p99_ms,
         refused: shared.counters.refused(),
         state_hash: metrics.state_hash,
     }

@@ -4,7 +4,7 @@
 //! network and no thread. What happens is queued as [`Change`]s, and a slot is given away again only after the
 //! [`Change::Ended`] of its last session was taken: that bounds the queue and keeps the order of a slot's sessions.
 
-use pita_protocol::message::{Controls, InputPacket, Role, buttons};
+use pita_protocol::message::{InputFrame, InputPacket, Role};
 use pita_protocol::seal::SessionKey;
 
 /// Limits of the state machine. Both kinds of slots together are at most `u16::MAX`.
@@ -16,8 +16,8 @@ pub struct Limits {
     pub spectators: u16,
     /// Silence after which a session ends, ms.
     pub input_timeout_ms: u64,
-    /// Input packets that are looked at between two ticks.
-    pub input_packets_per_tick: u32,
+    /// Inputs that are looked at between two ticks; a packet without a new one counts as one.
+    pub inputs_per_tick: u32,
 }
 
 /// One session, named for good: a slot is used again, a pair of slot and epoch is not, as far as chance goes.
@@ -90,15 +90,9 @@ pub enum Change {
 
 /// What an input packet said.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Received {
-    /// New controls.
-    Input {
-        /// Newest sequence in the packet.
-        sequence: u32,
-        /// The controls of that sequence; [`buttons::RESET`] is set if any frame that is new has it, so that a press
-        /// of one tick is not lost with one packet.
-        controls: Controls,
-    },
+pub enum Received<'a> {
+    /// Those of its frames that are new, oldest first; at least one.
+    Inputs(&'a [InputFrame]),
     /// The session ended with this packet.
     Left,
 }
@@ -135,8 +129,8 @@ struct Session {
     role: Role,
     heard_ms: u64,
     last_sequence: u32,
-    packets_tick: u64,
-    packets: u32,
+    inputs_tick: u64,
+    inputs: u32,
 }
 
 /// Why nobody can join.
@@ -176,8 +170,8 @@ impl Sessions {
             role,
             heard_ms: now_ms,
             last_sequence: 0,
-            packets_tick: 0,
-            packets: 0,
+            inputs_tick: 0,
+            inputs: 0,
         });
         self.changes.push(Change::Began { id, role, name: name.to_owned() });
         Ok(id)
@@ -195,37 +189,33 @@ impl Sessions {
     ///
     /// # Errors
     /// [`InputRefusal`].
-    pub fn receive(
+    pub fn receive<'a>(
         &mut self,
         slot: u16,
-        packet: &InputPacket,
+        packet: &'a InputPacket,
         tick: u64,
         now_ms: u64,
-    ) -> Result<Received, InputRefusal> {
+    ) -> Result<Received<'a>, InputRefusal> {
         let id = SessionId { slot, epoch: packet.epoch };
-        let packets_max = self.limits.input_packets_per_tick;
+        let inputs_max = self.limits.inputs_per_tick;
         let session = self.session_mut(id).ok_or(InputRefusal::NoSession)?;
-        if session.packets_tick != tick {
-            (session.packets_tick, session.packets) = (tick, 0);
+        if session.inputs_tick != tick {
+            (session.inputs_tick, session.inputs) = (tick, 0);
         }
-        session.packets += 1;
-        if session.packets > packets_max {
+        // Sequences of a valid packet ascend.
+        let fresh = &packet.frames[packet.frames.partition_point(|frame| frame.sequence <= session.last_sequence)..];
+        session.inputs = session.inputs.saturating_add(fresh.len().max(1) as u32);
+        if session.inputs > inputs_max {
             return Err(InputRefusal::Flood);
         }
         if packet.leave {
             self.end(id, EndReason::Left);
             return Ok(Received::Left);
         }
-        let mut fresh = packet.frames.iter().filter(|frame| frame.sequence > session.last_sequence);
-        let newest = packet.frames.last().filter(|frame| frame.sequence > session.last_sequence);
-        let newest = newest.ok_or(InputRefusal::Stale)?;
-        let mut controls = newest.controls;
-        if fresh.any(|frame| frame.controls.buttons & buttons::RESET != 0) {
-            controls.buttons |= buttons::RESET;
-        }
+        let newest = fresh.last().ok_or(InputRefusal::Stale)?;
         session.last_sequence = newest.sequence;
         session.heard_ms = now_ms;
-        Ok(Received::Input { sequence: newest.sequence, controls })
+        Ok(Received::Inputs(fresh))
     }
 
     /// The session's liveliness token is gone: ends it.

@@ -117,6 +117,10 @@ fn table_of(status: &Status) -> String {
     row("quarantined", status.quarantined.to_string());
     row("sent", report::rate(status.sent_bytes_per_s));
     row("received", report::rate(status.received_bytes_per_s));
+    let inputs = &status.inputs;
+    row("inputs in time / late", format!("{} / {}", inputs.in_time, inputs.late));
+    row("superseded / early / missing", format!("{} / {} / {}", inputs.superseded, inputs.early, inputs.missing));
+    row("input wait p50 / p99", format!("{:.1} / {:.1} ms", status.input_wait_p50_ms, status.input_wait_p99_ms));
     row("memory", format!("{:.1} MB", status.memory_bytes as f64 / 1e6));
     row("CPU since start", format!("{:.1} s", status.cpu_s));
     row("state hash", format!("{:016x}", status.state_hash));

@@ -12,7 +12,7 @@ use pita_game::{Arena, ArenaEvent, Command};
 use pita_protocol::message::{TICK_RECORDS_MAX, TickRecord};
 
 use crate::boarding::Boarding;
-use crate::drivers::Drivers;
+use crate::drivers::{Drivers, Now};
 use crate::frame::{Frame, Totals};
 use crate::pacer::Pacer;
 use crate::shared::{Phase, Shared};
@@ -104,6 +104,7 @@ impl Outside {
             given_up_ns: pacer.given_up_ns(),
             quarantined: self.quarantined,
             frames_missed: self.frames_missed,
+            inputs: self.drivers.counts(),
         };
         self.shared.frames.put_filled(frame);
         self.shared.wake_publisher();
@@ -156,8 +157,9 @@ impl Ports for Outside {
         let tick = tick + self.skipped;
         self.take_boarding(tick, into);
         let Self { shared, drivers, .. } = self;
-        shared.inputs.collect(tick, |arrival| drivers.hear(&arrival, tick));
-        self.drivers.drive(tick, into);
+        let now = Now { tick, ns: shared.clock.ns() };
+        shared.inputs.collect(tick, |arrival| drivers.hear(&arrival, now));
+        self.drivers.drive(now, into);
     }
 
     fn output(&mut self, arena: &Arena) {
@@ -169,6 +171,7 @@ impl Ports for Outside {
                 frame.tick = self.record.tick;
                 frame.copy_state(arena);
                 self.drivers.acks(&mut frame.acks);
+                frame.input_waits_us.extend_from_slice(self.drivers.waits_us());
             }
             None => self.frames_missed += 1,
         }

@@ -110,7 +110,7 @@ fn token_changed(shared: &Shared, key: &str, kind: SampleKind) {
 fn drivers(config: &ServerConfig, shared: &Shared) -> Drivers {
     let coast_ms = u64::from(config.sessions.coast_after_ms.get());
     let ticks = (coast_ms * u64::from(shared.tick_hz)).div_ceil(1000);
-    Drivers::new(shared.sessions().slots(), ticks)
+    Drivers::new(shared.sessions().slots(), ticks, 1_000_000_000 / u64::from(shared.tick_hz))
 }
 
 fn pacer(tick: Tick, shared: &Shared) -> Pacer {

@@ -1,8 +1,8 @@
 use super::*;
-use pita_protocol::message::InputFrame;
+use pita_protocol::message::Controls;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-const LIMITS: Limits = Limits { players: 2, spectators: 1, input_timeout_ms: 5000, input_packets_per_tick: 4 };
+const LIMITS: Limits = Limits { players: 2, spectators: 1, input_timeout_ms: 5000, inputs_per_tick: 4 };
 
 fn join(sessions: &mut Sessions, role: Role, now_ms: u64) -> Result<SessionId, JoinRefusal> {
     static EPOCHS: AtomicU32 = AtomicU32::new(1);
@@ -63,40 +63,28 @@ fn an_old_epoch_neither_drives_nor_ends_the_slots_new_session() {
 }
 
 #[test]
-fn the_newest_sequence_wins_and_nothing_is_applied_twice() {
+fn what_is_new_in_a_packet_goes_on_and_nothing_goes_on_twice() {
     let mut sessions = Sessions::new(LIMITS);
     let id = join(&mut sessions, Role::Player, 0).unwrap();
-    let mut receive = |sequences: &[u32], tick| sessions.receive(id.slot, &packet(id.epoch, sequences), tick, 1);
-    assert_eq!(receive(&[1, 2, 3], 1), Ok(Received::Input { sequence: 3, controls: Controls::default() }));
-    assert_eq!(receive(&[1, 2, 3], 1), Err(InputRefusal::Stale));
-    assert_eq!(receive(&[2], 1), Err(InputRefusal::Stale));
-    assert_eq!(receive(&[2, 3, 4], 1), Ok(Received::Input { sequence: 4, controls: Controls::default() }));
-}
-
-#[test]
-fn a_press_of_reset_survives_the_loss_of_its_packet_and_is_not_repeated() {
-    let mut sessions = Sessions::new(LIMITS);
-    let id = join(&mut sessions, Role::Player, 0).unwrap();
-    let mut with_reset = packet(id.epoch, &[1, 2, 3]);
-    with_reset.frames[1].controls.buttons = buttons::RESET;
-    let mut pressed = |packet: &InputPacket| match sessions.receive(id.slot, packet, 1, 1) {
-        Ok(Received::Input { controls, .. }) => controls.buttons & buttons::RESET != 0,
-        other => panic!("{other:?}"),
-    };
-    assert!(pressed(&with_reset));
-    with_reset.frames.push(packet(id.epoch, &[4]).frames[0]);
-    assert!(!pressed(&with_reset), "frame 2 was already looked at");
+    let mut receive =
+        |sequences: &[u32], tick| match sessions.receive(id.slot, &packet(id.epoch, sequences), tick, 1)? {
+            Received::Inputs(fresh) => Ok(fresh.iter().map(|frame| frame.sequence).collect::<Vec<_>>()),
+            Received::Left => panic!("nobody left"),
+        };
+    assert_eq!(receive(&[1, 2, 3], 1), Ok(vec![1, 2, 3]));
+    assert_eq!(receive(&[1, 2, 3], 2), Err(InputRefusal::Stale));
+    assert_eq!(receive(&[2], 2), Err(InputRefusal::Stale));
+    assert_eq!(receive(&[2, 3, 4], 2), Ok(vec![4]));
 }
 
 #[test]
 fn a_flood_is_cut_until_the_next_tick() {
     let mut sessions = Sessions::new(LIMITS);
     let id = join(&mut sessions, Role::Player, 0).unwrap();
-    let results: Vec<_> =
-        (1..=6).map(|sequence| sessions.receive(id.slot, &packet(id.epoch, &[sequence]), 10, 1)).collect();
-    assert!(results[..4].iter().all(Result::is_ok));
-    assert_eq!(results[4..], [Err(InputRefusal::Flood); 2]);
-    assert!(sessions.receive(id.slot, &packet(id.epoch, &[7]), 11, 1).is_ok());
+    let mut refused = |sequences: &[u32], tick| sessions.receive(id.slot, &packet(id.epoch, sequences), tick, 1).err();
+    assert_eq!([&[1, 2][..], &[3], &[3, 4]].map(|sequences| refused(sequences, 10)), [None; 3]);
+    assert_eq!([&[5][..], &[1]].map(|sequences| refused(sequences, 10)), [Some(InputRefusal::Flood); 2]);
+    assert_eq!(refused(&[5], 11), None);
 }
 
 #[test]
