@@ -13,10 +13,11 @@ use std::{
 
 use pita_protocol::{
     decode,
-    message::{JoinAccepted, Snapshot},
+    message::{FATES_MAX, InputAck, InputFate, JoinAccepted, Snapshot},
 };
 
 use crate::{
+    input_clock::InputClock,
     snapshot::ReceivedSnapshot,
     statistics::Statistics,
     tick_clock::TickClock,
@@ -38,6 +39,7 @@ pub struct Inbox {
     epoch: u32,
     ledger: TickLedger,
     clock: TickClock,
+    inputs: InputClock,
     /// Newest tick that is known, and when it became known.
     newest: (u64, Instant),
     /// For the interpolation buffer, newest last; empty where nobody interpolates.
@@ -45,6 +47,8 @@ pub struct Inbox {
     recent_max: usize,
     /// Sequence numbers that were sent and not acknowledged, with the time of their send.
     in_flight: VecDeque<(u32, Instant)>,
+    /// Newest sequence of which the fate has been counted.
+    counted: u32,
     statistics: Statistics,
     /// Snapshots whose slices could not be read, which shows only when somebody asks for them.
     malformed_slices: Arc<AtomicU64>,
@@ -58,10 +62,12 @@ impl Inbox {
             epoch: accepted.epoch,
             ledger: TickLedger::default(),
             clock: TickClock::new(accepted.tick_hz),
+            inputs: InputClock::new(),
             newest: (accepted.description.tick, now),
             recent: VecDeque::new(),
             recent_max,
             in_flight: VecDeque::new(),
+            counted: 0,
             statistics: Statistics::default(),
             malformed_slices: Arc::default(),
         }
@@ -85,8 +91,8 @@ impl Inbox {
         if arrival == Arrival::Stale {
             return None;
         }
-        self.acknowledged(head.ack.sequence, now);
-        self.clock.observe(head.tick, self.seconds(now));
+        self.acknowledged(&head.ack, now);
+        self.follow_clock(&head, now);
         let snapshot = Arc::new(ReceivedSnapshot::new(head, now, Arc::clone(&self.malformed_slices)));
         if self.recent_max > 0 {
             if self.recent.len() == self.recent_max {
@@ -121,8 +127,26 @@ impl Inbox {
         self.statistics.events_missed += u64::from(missed);
     }
 
-    /// Takes note of an input packet that goes out at `now`.
-    pub fn note_sent(&mut self, sequence: u32, bytes: usize, now: Instant) {
+    /// Tick for which an input is that is sent at `now`.
+    pub fn input_tick(&self, now: Instant) -> u64 {
+        // Before the first snapshot the tick of the join is the best that is known.
+        self.inputs.tick_at(self.seconds(now), self.clock.period_s()).unwrap_or(self.newest.0 + 1)
+    }
+
+    /// When the input of the next tick is due; `None` before the first snapshot.
+    pub fn next_input_due(&self) -> Option<Instant> {
+        let due_s = self.inputs.next_due_s(self.clock.period_s())?;
+        Some(self.began + Duration::try_from_secs_f64(due_s.max(0.0)).unwrap_or_default())
+    }
+
+    /// Takes note of an input packet that goes out at `now`, its newest input meant for `tick`.
+    pub fn note_sent(&mut self, sequence: u32, tick: u64, bytes: usize, now: Instant) {
+        let seconds = self.seconds(now);
+        self.inputs.note_sent(sequence, tick, seconds);
+        if let Some(seen) = self.clock.tick_at(seconds) {
+            let lead_s = (tick as f64 - seen) * self.clock.period_s();
+            self.statistics.lead_us.saturating_record((lead_s.max(0.0) * 1e6) as u64);
+        }
         self.statistics.inputs_sent += 1;
         self.statistics.sent_bytes += bytes as u64;
         if self.in_flight.len() == IN_FLIGHT_MAX {
@@ -169,10 +193,42 @@ impl Inbox {
         tick.saturating_sub(newest) as f64 * self.clock.period_s() <= allowed_s
     }
 
-    fn acknowledged(&mut self, sequence: u32, now: Instant) {
-        while let Some((_, sent)) = self.in_flight.pop_front_if(|(sent, _)| *sent <= sequence) {
-            let micros = u64::try_from(now.saturating_duration_since(sent).as_micros()).unwrap_or(u64::MAX);
-            self.statistics.latency_us.saturating_record(micros);
+    fn acknowledged(&mut self, ack: &InputAck, now: Instant) {
+        self.count_fates(ack);
+        while let Some((sequence, sent)) = self.in_flight.pop_front_if(|(sent, _)| *sent <= ack.sequence) {
+            let fate = ack.fates.get((ack.sequence - sequence) as usize);
+            // What was passed over has no effect to wait for; of what is further back nothing is known.
+            if let Some(InputFate::Applied { .. }) | None = fate {
+                let micros = u64::try_from(now.saturating_duration_since(sent).as_micros()).unwrap_or(u64::MAX);
+                self.statistics.latency_us.saturating_record(micros);
+            }
+        }
+    }
+
+    fn count_fates(&mut self, ack: &InputAck) {
+        for behind in (0..ack.sequence.saturating_sub(self.counted) as usize).take(FATES_MAX) {
+            match ack.fates.get(behind) {
+                Some(InputFate::Applied { late_ticks: 0 }) => self.statistics.inputs_in_time += 1,
+                Some(InputFate::Applied { .. }) => self.statistics.inputs_late += 1,
+                Some(InputFate::Superseded) => self.statistics.inputs_superseded += 1,
+                Some(InputFate::Early) => self.statistics.inputs_early += 1,
+                Some(InputFate::Missing) => self.statistics.inputs_missing += 1,
+                None => {}
+            }
+        }
+        self.counted = self.counted.max(ack.sequence);
+    }
+
+    /// Both clocks learn from a snapshot: when the server ticks, and when inputs have to leave.
+    fn follow_clock(&mut self, head: &Snapshot, now: Instant) {
+        let seconds = self.seconds(now);
+        let late_s = self.clock.observe(head.tick, seconds);
+        self.statistics.jitter_us.saturating_record((late_s.abs() * 1e6) as u64);
+        let period_s = self.clock.period_s();
+        let slack_s = f64::from(head.ack.slack_ms) * 1e-3;
+        self.inputs.note_slack(head.ack.received, slack_s, period_s, seconds);
+        if let Some(seen_s) = self.clock.expected_s(0) {
+            self.inputs.follow(seen_s, period_s, seconds);
         }
     }
 
@@ -184,11 +240,7 @@ impl Inbox {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pita_protocol::{
-        encode,
-        message::{Description, InputAck},
-        seal::SessionKey,
-    };
+    use pita_protocol::{encode, message::Description, seal::SessionKey};
     use proptest::prelude::*;
 
     const EPOCH: u32 = 9;
@@ -220,7 +272,8 @@ mod tests {
     }
 
     fn message(tick: u64, ack: u32) -> Vec<u8> {
-        let ack = InputAck { sequence: ack, tick };
+        let mut ack = InputAck { sequence: ack, tick, ..InputAck::default() };
+        (0..FATES_MAX).for_each(|behind| ack.fates.set(behind, InputFate::Applied { late_ticks: 0 }));
         encode(&Snapshot { epoch: EPOCH, tick, ack, event_sequence: 0, dof: Vec::new() })
     }
 
@@ -241,7 +294,7 @@ mod tests {
         let start = Instant::now();
         let mut inbox = inbox(0, 0, start);
         for sequence in 1..=3 {
-            inbox.note_sent(sequence, 50, start + PERIOD * sequence);
+            inbox.note_sent(sequence, 4, 50, start + PERIOD * sequence);
         }
         inbox.take_snapshot(&message(4, 2), start + PERIOD * 4);
         inbox.take_snapshot(&message(5, 2), start + PERIOD * 5);
@@ -249,7 +302,8 @@ mod tests {
         assert_eq!(latency.len(), 2);
         assert!(latency.max().abs_diff(99_000) < 2_000 && latency.min().abs_diff(66_000) < 1_000);
         inbox.take_snapshot(&message(6, 3), start + PERIOD * 6);
-        assert_eq!(inbox.statistics().latency_us.len(), 3);
+        let counts = inbox.statistics();
+        assert_eq!((counts.latency_us.len(), counts.inputs_in_time), (3, 3));
     }
 
     #[test]
@@ -275,7 +329,7 @@ mod tests {
                 inbox.take_snapshot(&[&[1, 5][..], &bytes].concat(), now);
             }
             for (tick, ack) in acks {
-                inbox.note_sent(1, 1, now);
+                inbox.note_sent(1, tick, 1, now);
                 inbox.take_snapshot(&message(tick, ack), now);
             }
         }
@@ -285,7 +339,7 @@ mod tests {
             let now = Instant::now();
             let mut inbox = inbox(0, 3, now);
             for tick in 1..=count {
-                inbox.note_sent(tick as u32, 1, now);
+                inbox.note_sent(tick as u32, tick, 1, now);
                 inbox.take_snapshot(&message(tick, 0), now);
             }
             prop_assert!(inbox.in_flight.len() <= IN_FLIGHT_MAX && inbox.recent.len() <= 3);

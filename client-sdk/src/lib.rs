@@ -16,6 +16,7 @@ mod builder;
 mod error;
 mod events;
 mod inbox;
+mod input_clock;
 mod interpolation;
 mod join;
 mod keeper;
@@ -40,5 +41,5 @@ pub use session::{Session, WorldState};
 pub use snapshot::ReceivedSnapshot;
 pub use statistics::{Durations, Statistics};
 
-pub use pita_protocol::message::{ActorDescription, Controls, Description, Event, buttons};
+pub use pita_protocol::message::{ActorDescription, Controls, Description, Event, InputAck, InputFate, buttons};
 pub use pita_protocol::slices::{PackedSlice, Slice};

@@ -107,9 +107,16 @@ impl Session {
         self.shared.roster()
     }
 
-    /// Sends `controls` for the coming tick, with the last few before them in case those were lost, and acknowledges
+    /// When the next input is due: sent then, it arrives just before the server collects for its tick, as far as the
+    /// connection has let the session learn. One tick from now until it has learnt anything.
+    pub fn next_input_due(&self) -> Instant {
+        let tick = Duration::from_secs_f64(1.0 / f64::from(self.tick_hz()));
+        lock(&self.shared.inbox).next_input_due().unwrap_or_else(|| Instant::now() + tick)
+    }
+
+    /// Sends `controls` for the first tick that they can reach, with the last few before them in case those were lost, and acknowledges
     /// the newest snapshot. Answers the sequence number under which [`ReceivedSnapshot::ack`] will confirm them. Meant
-    /// to be called once a tick; the server ends a session that stays silent for too long.
+    /// to be called once a tick, [when it is due](Self::next_input_due); the server ends a session that stays silent for too long.
     ///
     /// # Errors
     /// [`ClientError::BadArgument`] naming a control that is out of range, [`ClientError::Spectator`],

@@ -35,12 +35,26 @@ pub struct Statistics {
     pub malformed: u64,
     /// Input packets sent.
     pub inputs_sent: u64,
+    /// Inputs of which the server said that it applied them at the tick that they were meant for.
+    pub inputs_in_time: u64,
+    /// Applied at a later tick.
+    pub inputs_late: u64,
+    /// Not applied, because a newer one was.
+    pub inputs_superseded: u64,
+    /// Refused as meant for a tick too far ahead.
+    pub inputs_early: u64,
+    /// Never arrived there.
+    pub inputs_missing: u64,
     /// Payload of everything received, bytes.
     pub received_bytes: u64,
     /// Payload of everything sent, bytes.
     pub sent_bytes: u64,
     /// From the send of an input to the arrival of the first snapshot that contains its effect, µs.
     pub latency_us: Durations,
+    /// How far snapshots arrived from when they were expected, µs.
+    pub jitter_us: Durations,
+    /// From the newest state seen to the tick that an input is meant for, when it is sent, µs.
+    pub lead_us: Durations,
 }
 
 impl Default for Statistics {
@@ -54,9 +68,16 @@ impl Default for Statistics {
             events_missed: 0,
             malformed: 0,
             inputs_sent: 0,
+            inputs_in_time: 0,
+            inputs_late: 0,
+            inputs_superseded: 0,
+            inputs_early: 0,
+            inputs_missing: 0,
             received_bytes: 0,
             sent_bytes: 0,
             latency_us: durations(),
+            jitter_us: durations(),
+            lead_us: durations(),
         }
     }
 }
@@ -68,8 +89,10 @@ impl Statistics {
         for (count, before) in interval.counts().into_iter().zip(earlier.clone().counts()) {
             *count = count.saturating_sub(*before);
         }
-        // Fails only where `earlier` holds more than `self`, which it does not by its meaning.
-        let _ = interval.latency_us.subtract(&earlier.latency_us);
+        for (durations, before) in interval.durations().into_iter().zip(earlier.clone().durations()) {
+            // Fails only where `earlier` holds more than `self`, which it does not by its meaning.
+            let _ = durations.subtract(&*before);
+        }
         interval
     }
 
@@ -78,11 +101,17 @@ impl Statistics {
         for (count, more) in self.counts().into_iter().zip(other.clone().counts()) {
             *count += *more;
         }
-        // All histograms here have the same bounds.
-        let _ = self.latency_us.add(&other.latency_us);
+        for (durations, more) in self.durations().into_iter().zip(other.clone().durations()) {
+            // All histograms here have the same bounds.
+            let _ = durations.add(&*more);
+        }
     }
 
-    fn counts(&mut self) -> [&mut u64; 10] {
+    fn durations(&mut self) -> [&mut Durations; 3] {
+        [&mut self.latency_us, &mut self.jitter_us, &mut self.lead_us]
+    }
+
+    fn counts(&mut self) -> [&mut u64; 15] {
         [
             &mut self.snapshots_received,
             &mut self.snapshots_missed,
@@ -92,6 +121,11 @@ impl Statistics {
             &mut self.events_missed,
             &mut self.malformed,
             &mut self.inputs_sent,
+            &mut self.inputs_in_time,
+            &mut self.inputs_late,
+            &mut self.inputs_superseded,
+            &mut self.inputs_early,
+            &mut self.inputs_missing,
             &mut self.received_bytes,
             &mut self.sent_bytes,
         ]

@@ -9,42 +9,66 @@ const EARLY_GAIN: f64 = 0.5;
 const LATE_GAIN: f64 = 0.05;
 /// Errors above this are no jitter (a server that paused, a machine that slept) and are taken over at once, s.
 const STEP_S: f64 = 0.5;
+/// Fraction of each correction by which the length of a tick is corrected too: two clocks drift apart by a constant
+/// share, and corrections that do not cancel out are drift. It is followed within about twenty seconds.
+const DRIFT_GAIN: f64 = 0.002;
+/// Two clocks differ by less, as a share; more is a server that cannot keep up, which may end at any time.
+const DRIFT_MAX: f64 = 0.01;
 
 /// Maps local time to the server's tick, as seen through the connection: the estimate at the arrival of snapshot `n`
 /// is about `n`.
 #[derive(Clone, Debug)]
 pub struct TickClock {
+    nominal_s: f64,
+    /// Length of a tick by the local clock, s.
     period_s: f64,
-    origin_s: Option<f64>,
+    /// A tick that was observed, and when it was expected to arrive, s.
+    reference: Option<(u64, f64)>,
 }
 
 impl TickClock {
     /// Clock of a server that runs at `tick_hz`.
     pub fn new(tick_hz: u16) -> Self {
-        Self { period_s: 1.0 / f64::from(tick_hz.max(1)), origin_s: None }
+        let nominal_s = 1.0 / f64::from(tick_hz.max(1));
+        Self { nominal_s, period_s: nominal_s, reference: None }
     }
 
-    /// Length of a tick, s.
+    /// Length of a tick by the local clock, s.
     pub fn period_s(&self) -> f64 {
         self.period_s
     }
 
-    /// Takes into account that the snapshot of `tick` arrived at `at_s`.
-    pub fn observe(&mut self, tick: u64, at_s: f64) {
-        let seen = at_s - tick as f64 * self.period_s;
-        let origin = self.origin_s.get_or_insert(seen);
-        let error = seen - *origin;
+    /// Takes into account that the snapshot of `tick` arrived at `at_s`; answers how much later than estimated, s.
+    pub fn observe(&mut self, tick: u64, at_s: f64) -> f64 {
+        let Some(expected_s) = self.expected_s(tick) else {
+            self.reference = Some((tick, at_s));
+            return 0.0;
+        };
+        let error = at_s - expected_s;
         let gain = match error {
             e if e.abs() > STEP_S => 1.0,
             e if e < 0.0 => EARLY_GAIN,
             _ => LATE_GAIN,
         };
-        *origin += gain * error;
+        let correction = gain * error;
+        self.reference = Some((tick, expected_s + correction));
+        if gain < 1.0 {
+            let (least, most) = (self.nominal_s * (1.0 - DRIFT_MAX), self.nominal_s * (1.0 + DRIFT_MAX));
+            self.period_s = (self.period_s + DRIFT_GAIN * correction).clamp(least, most);
+        }
+        error
+    }
+
+    /// When the snapshot of `tick` is or was to be expected, s; `None` before the first snapshot.
+    pub fn expected_s(&self, tick: u64) -> Option<f64> {
+        let (reference, at_s) = self.reference?;
+        Some(at_s + (tick as f64 - reference as f64) * self.period_s)
     }
 
     /// Estimated tick at `at_s`, fractional, not below zero; `None` before the first snapshot.
     pub fn tick_at(&self, at_s: f64) -> Option<f64> {
-        Some(((at_s - self.origin_s?) / self.period_s).max(0.0))
+        let (reference, reference_s) = self.reference?;
+        Some((reference as f64 + (at_s - reference_s) / self.period_s).max(0.0))
     }
 }
 
@@ -92,5 +116,19 @@ mod tests {
             worst = worst.max((clock.tick_at(now).unwrap() - tick as f64).abs());
         }
         assert!(worst < 5.0, "{worst} ticks ahead");
+    }
+
+    #[test]
+    fn learns_how_two_clocks_drift_apart() {
+        for share in [-0.002, 0.002] {
+            let mut clock = TickClock::new(HZ);
+            let period_s = (1.0 + share) / f64::from(HZ);
+            let jitter = |tick: u64| 0.01 * (tick as f64 * 0.618_034).fract();
+            for tick in 0..3000 {
+                clock.observe(tick, tick as f64 * period_s + jitter(tick));
+            }
+            let learnt = clock.period_s() * f64::from(HZ) - 1.0;
+            assert!((learnt - share).abs() < 0.0007, "{learnt} instead of {share}");
+        }
     }
 }

@@ -47,20 +47,17 @@ impl Wire {
         Ok(Self { publisher, key_expr, session_key: accepted.session_key.clone(), outbox, shared })
     }
 
-    /// Sends `controls` for the tick that the server is about to run; answers their sequence number.
+    /// Sends `controls` for the first tick that they can reach; answers their sequence number.
     pub async fn send(&self, controls: Controls, leave: bool) -> Result<u32, ClientError> {
         controls.validate().map_err(ClientError::BadArgument)?;
         let now = Instant::now();
         let (newest, tick) = {
             let inbox = lock(&self.shared.inbox);
-            let newest = inbox.newest_tick();
-            // Before the first snapshot the tick of the join is the best that is known.
-            let estimate = inbox.tick_at(now).map_or(newest, |tick| tick as u64);
-            (newest, estimate.max(newest).saturating_add(1))
+            (inbox.newest_tick(), inbox.input_tick(now))
         };
         let (sequence, packet) = lock(&self.outbox).packet(controls, tick, newest, leave);
         let sealed = seal(&packet, &self.session_key, &self.key_expr);
-        lock(&self.shared.inbox).note_sent(sequence, sealed.len(), now);
+        lock(&self.shared.inbox).note_sent(sequence, tick, sealed.len(), now);
         self.publisher.put(sealed).await.map_err(ClientError::transport("send input"))?;
         Ok(sequence)
     }

@@ -1,4 +1,4 @@
-//! One bot at work: sends on an absolute schedule until it is stopped or its session ends.
+//! One bot at work: sends each input when it is due until it is stopped or its session ends.
 
 use std::{
     sync::{Arc, Mutex},
@@ -58,19 +58,18 @@ impl Driver {
         Self { session, actor, script, recovery: Recovery::default(), meter, last: None }
     }
 
-    /// Drives until `stop` turns true or the session ends; leaves in either case. The first input is due after
-    /// `phase`, so that many bots do not all send at the same instant.
-    pub async fn run(mut self, phase: Duration, mut stop: watch::Receiver<bool>) {
+    /// Drives until `stop` turns true or the session ends; leaves in either case.
+    pub async fn run(mut self, mut stop: watch::Receiver<bool>) {
         let period = Duration::from_secs_f64(1.0 / f64::from(self.session.tick_hz()));
-        let mut due = Instant::now() + phase;
         loop {
+            let due = Instant::from_std(self.session.next_input_due());
             tokio::select! {
                 biased;
                 // An error means that the fleet is gone, which stops its bots too.
                 _ = stop.wait_for(|&stop| stop) => break,
                 () = sleep_until(due) => {}
             }
-            due = self.note_lateness(due, period) + period;
+            self.note_lateness(due, period);
             let controls = self.controls();
             match self.session.send(controls).await {
                 Ok(_) => {}
@@ -84,15 +83,13 @@ impl Driver {
         self.session.leave().await;
     }
 
-    /// Records how late an input is, and answers when it was due: inputs that are late by whole ticks are left out,
-    /// and the schedule stays what it was.
-    fn note_lateness(&self, due: Instant, period: Duration) -> Instant {
+    /// Records how late an input is: those that are late by whole ticks are left out.
+    fn note_lateness(&self, due: Instant, period: Duration) {
         let late = due.elapsed();
         let skipped = (late.as_nanos() / period.as_nanos().max(1)).min(u128::from(u32::MAX)) as u32;
         let mut meter = lock(&self.meter);
         meter.lateness_us.saturating_record(u64::try_from(late.as_micros()).unwrap_or(u64::MAX));
         meter.inputs_skipped += u64::from(skipped);
-        due + period * skipped
     }
 
     /// Neutral while there is nothing to see.

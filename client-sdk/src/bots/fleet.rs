@@ -129,7 +129,7 @@ impl BotFleet {
         let (statistics, meter) = (session.statistics_reader(), Arc::new(Mutex::new(Meter::new())));
         let seed = self.settings.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(number as u64);
         let driver = Driver::new(session, actor, script.script(seed), Arc::clone(&meter));
-        let task = tokio::spawn(driver.run(phase_of(number), self.stop.subscribe()));
+        let task = tokio::spawn(driver.run(self.stop.subscribe()));
         self.bots.push(Bot { script, statistics, meter, task });
         Ok(())
     }
@@ -173,9 +173,4 @@ async fn connect(settings: FleetSettings, number: usize) -> Result<(usize, Sessi
     };
     let builder = builder.connect_timeout(settings.connect_timeout).loss_timeout(settings.loss_timeout);
     Ok((number, builder.interpolation(None).connect().await?))
-}
-
-/// Spreads the bots over a thirtieth of a second by the golden ratio, which stays even however many are added.
-fn phase_of(number: usize) -> Duration {
-    Duration::from_secs_f64((number as f64 * 0.618_033_988_75).fract() / 30.0)
 }

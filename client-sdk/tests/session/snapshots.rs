@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use pita_client::{Controls, InterpolationSettings};
-use pita_protocol::message::{InputAck, Snapshot};
+use pita_protocol::message::{InputAck, InputFate, Snapshot};
 
 use crate::{
     builder, eventually,
@@ -50,7 +50,8 @@ async fn acknowledgements_give_the_latency() {
     let packet = server.input().await;
     assert_eq!(packet.snapshot_tick, 101, "it acknowledges the newest snapshot");
     tokio::time::sleep(Duration::from_millis(50)).await;
-    let ack = InputAck { sequence: 3, tick: 102 };
+    let mut ack = InputAck { sequence: 3, tick: 102, ..InputAck::default() };
+    (0..3).for_each(|behind| ack.fates.set(behind, InputFate::Applied { late_ticks: 0 }));
     server.put_snapshot(Snapshot { ack, ..snapshot(102) }).await;
     let counts = eventually(&session, "three latencies", |s| s.latency_us.len() == 3).await;
     assert!(counts.latency_us.min() >= 49_000, "{} µs", counts.latency_us.min());
