@@ -7,7 +7,10 @@ use pita_protocol::{
     message::{JoinRequest, Role},
 };
 
-use crate::{error::ClientError, interpolation::InterpolationSettings, join::join, session::Session, transport};
+use crate::{
+    conditioner::ConditionerSettings, error::ClientError, interpolation::InterpolationSettings, join::join,
+    session::Session, transport,
+};
 
 /// What a session is to be; ends in [`SessionBuilder::connect`].
 #[derive(Clone, Debug)]
@@ -19,6 +22,7 @@ pub struct SessionBuilder {
     pub(crate) connect_timeout: Duration,
     pub(crate) loss_timeout: Duration,
     pub(crate) interpolation: Option<InterpolationSettings>,
+    pub(crate) conditioner: Option<ConditionerSettings>,
 }
 
 impl SessionBuilder {
@@ -31,6 +35,7 @@ impl SessionBuilder {
             connect_timeout: Duration::from_secs(5),
             loss_timeout: Duration::from_secs(3),
             interpolation: Some(InterpolationSettings::default()),
+            conditioner: None,
         }
     }
 
@@ -62,6 +67,12 @@ impl SessionBuilder {
     /// would need.
     pub fn interpolation(mut self, settings: Option<InterpolationSettings>) -> Self {
         self.interpolation = settings;
+        self
+    }
+
+    /// Makes the network worse than it is, to see what comes of it.
+    pub fn conditioner(mut self, settings: Option<ConditionerSettings>) -> Self {
+        self.conditioner = settings;
         self
     }
 

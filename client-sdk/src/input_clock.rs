@@ -19,6 +19,9 @@ const FIRST_LEAD_S: f64 = 0.1;
 const SETTLED: usize = 8;
 /// Share of a tick by which the lead shrinks in a tick: inputs come a little closer together, and none is left out.
 const SHRINK: f64 = 0.05;
+/// Share of a tick by which an input may leave after it was due and still be meant for its tick: timers wake late, and
+/// to leave a tick out for that costs more than the risk that one is late.
+const OVERDUE: f64 = 0.25;
 /// Inputs that wait for their measurement.
 const SENT_MAX: usize = 256;
 
@@ -97,8 +100,7 @@ impl InputClock {
     /// Tick for which an input is that leaves at `now_s`: the first that it can reach, and none before that of the last
     /// input. `None` before the first snapshot.
     pub fn tick_at(&self, now_s: f64, period_s: f64) -> Option<u64> {
-        // A timer may wake a hair early: that is not worth a tick.
-        let reached = ((now_s - self.origin_s?) / period_s - 0.02).ceil().max(0.0);
+        let reached = ((now_s - self.origin_s?) / period_s - OVERDUE).ceil().max(0.0);
         Some((reached as u64).max(self.last_tick))
     }
 
@@ -129,8 +131,10 @@ mod tests {
             }
             clock.follow(one_way_s(0), PERIOD_S, now);
             let due = clock.next_due_s(PERIOD_S).unwrap();
-            let at = due.max(now);
+            // Timers wake up to 2 ms late.
+            let at = due.max(now) + 0.002 * (tick as f64 * 0.754_877).fract();
             let meant = clock.tick_at(at, PERIOD_S).unwrap();
+            assert!(tick < ticks / 2 || clock.last_tick + 1 == meant, "a tick was left out");
             let sequence = tick as u32 + 1;
             clock.note_sent(sequence, meant, at);
             let arrived = at + one_way_s(tick + 7);
@@ -159,7 +163,7 @@ mod tests {
         let slacks = play(2000, one_way);
         let late = slacks.iter().filter(|&&slack| slack < 0.0).count();
         assert!(late * 100 <= slacks.len(), "{late} of {} late", slacks.len());
-        assert!(slacks.iter().all(|&slack| slack < 0.052), "{:?}", slacks.iter().copied().fold(0.0, f64::max));
+        assert!(slacks.iter().all(|&slack| slack < 0.054), "{:?}", slacks.iter().copied().fold(0.0, f64::max));
     }
 
     #[test]

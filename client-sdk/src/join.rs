@@ -14,6 +14,7 @@ use zenoh::{liveliness::LivelinessToken, pubsub::Subscriber};
 
 use crate::{
     builder::SessionBuilder,
+    conditioner::{ConditionerSettings, Delivery, Link},
     error::ClientError,
     interpolation::InterpolationBuffer,
     keeper::{self, EVENTS_MAX, Incoming, Keeper},
@@ -44,15 +45,15 @@ pub async fn join(
     let keys = Keys::new(&arena).map_err(ClientError::BadArgument)?;
 
     // Before the join: no event falls between the description in its answer and the subscription.
-    let (events, incoming) = subscribe_to_events(zenoh, &keys).await?;
+    let (events, incoming) = subscribe_to_events(zenoh, &keys, wanted.conditioner).await?;
     let accepted = ask_to_join(wanted, zenoh, &keys, request).await?;
     let shared = Arc::new(share(wanted, &accepted));
     let declared = Declared {
         _events: events,
-        _snapshots: subscribe_to_snapshots(zenoh, &keys, &accepted, &shared).await?,
+        _snapshots: subscribe_to_snapshots(zenoh, &keys, &accepted, &shared, wanted.conditioner).await?,
         _token: declare_alive(zenoh, &keys, &accepted).await?,
     };
-    let wire = Arc::new(Wire::open(zenoh, &keys, &accepted, Arc::clone(&shared)).await?);
+    let wire = Arc::new(Wire::open(zenoh, &keys, &accepted, Arc::clone(&shared), wanted.conditioner).await?);
     let silent_otherwise = wanted.role == Role::Spectator;
     let keeper = Keeper {
         zenoh: zenoh.clone(),
@@ -109,14 +110,36 @@ fn share(wanted: &SessionBuilder, accepted: &JoinAccepted) -> Shared {
     Shared::new(accepted, recent_max, interpolation)
 }
 
-async fn subscribe_to_events(zenoh: &zenoh::Session, keys: &Keys) -> Result<(Subscriber<()>, Incoming), ClientError> {
+async fn subscribe_to_events(
+    zenoh: &zenoh::Session,
+    keys: &Keys,
+    conditioner: Option<ConditionerSettings>,
+) -> Result<(Subscriber<()>, Incoming), ClientError> {
     let (sender, incoming) = mpsc::channel(EVENTS_MAX);
-    let subscriber = zenoh
-        .declare_subscriber(keys.event())
-        .callback(move |sample| keeper::forward(&sample.payload().to_bytes(), &sender))
-        .await
-        .map_err(ClientError::transport("subscribe to events"))?;
+    let take = move |bytes: &[u8]| keeper::forward(bytes, &sender);
+    let subscriber = subscribe(zenoh, keys.event(), "subscribe to events", conditioner, Delivery::Stream, take).await?;
     Ok((subscriber, Incoming(incoming)))
+}
+
+/// Gives what arrives on `key` to `take`, through the conditioner where there is one.
+async fn subscribe(
+    zenoh: &zenoh::Session,
+    key: String,
+    action: &'static str,
+    conditioner: Option<ConditionerSettings>,
+    delivery: Delivery,
+    take: impl Fn(&[u8]) + Send + Sync + 'static,
+) -> Result<Subscriber<()>, ClientError> {
+    let link = conditioner.map(|settings| (settings.down, settings.seed ^ u64::from(delivery == Delivery::Stream)));
+    let subscriber = zenoh.declare_subscriber(key);
+    let subscribed = match link {
+        None => subscriber.callback(move |sample| take(&sample.payload().to_bytes())).await,
+        Some((conditions, seed)) => {
+            let link = Link::new(conditions, delivery, seed, move |bytes| take(&bytes));
+            subscriber.callback(move |sample| link.carry(sample.payload().to_bytes().into_owned())).await
+        }
+    };
+    subscribed.map_err(ClientError::transport(action))
 }
 
 async fn subscribe_to_snapshots(
@@ -124,13 +147,11 @@ async fn subscribe_to_snapshots(
     keys: &Keys,
     accepted: &JoinAccepted,
     shared: &Arc<Shared>,
+    conditioner: Option<ConditionerSettings>,
 ) -> Result<Subscriber<()>, ClientError> {
-    let shared = Arc::clone(shared);
-    zenoh
-        .declare_subscriber(keys.snapshot(accepted.slot))
-        .callback(move |sample| shared.take_snapshot(&sample.payload().to_bytes(), Instant::now()))
-        .await
-        .map_err(ClientError::transport("subscribe to snapshots"))
+    let (shared, key) = (Arc::clone(shared), keys.snapshot(accepted.slot));
+    let take = move |bytes: &[u8]| shared.take_snapshot(bytes, Instant::now());
+    subscribe(zenoh, key, "subscribe to snapshots", conditioner, Delivery::Datagrams, take).await
 }
 
 async fn declare_alive(

@@ -13,6 +13,7 @@
 
 pub mod bots;
 mod builder;
+mod conditioner;
 mod error;
 mod events;
 mod inbox;
@@ -33,6 +34,7 @@ mod transport;
 mod wire;
 
 pub use builder::SessionBuilder;
+pub use conditioner::{ConditionerSettings, Conditions, ConditionsError, Freeze};
 pub use error::{ClientError, SessionEnd};
 pub use events::SessionEvent;
 pub use interpolation::{Frame, InterpolationBuffer, InterpolationSettings};

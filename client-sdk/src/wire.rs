@@ -11,16 +11,24 @@ use pita_protocol::{
     seal::{SessionKey, seal},
 };
 use zenoh::{
+    Wait,
     pubsub::Publisher,
     qos::{CongestionControl, Priority},
 };
 
-use crate::{error::ClientError, lock::lock, outbox::Outbox, shared::Shared};
+use crate::{
+    conditioner::{ConditionerSettings, Delivery, Link},
+    error::ClientError,
+    lock::lock,
+    outbox::Outbox,
+    shared::Shared,
+};
 
 /// Sends the inputs of one session.
 #[derive(Debug)]
 pub struct Wire {
-    publisher: Publisher<'static>,
+    publisher: Arc<Publisher<'static>>,
+    conditioner: Option<Link>,
     key_expr: String,
     session_key: SessionKey,
     outbox: Mutex<Outbox>,
@@ -34,6 +42,7 @@ impl Wire {
         keys: &Keys,
         accepted: &JoinAccepted,
         shared: Arc<Shared>,
+        conditioner: Option<ConditionerSettings>,
     ) -> Result<Self, ClientError> {
         let key_expr = keys.input(accepted.slot);
         let publisher = zenoh
@@ -43,8 +52,15 @@ impl Wire {
             .express(true)
             .await
             .map_err(ClientError::transport("declare the input publisher"))?;
+        let publisher = Arc::new(publisher);
         let outbox = Mutex::new(Outbox::new(accepted.epoch));
-        Ok(Self { publisher, key_expr, session_key: accepted.session_key.clone(), outbox, shared })
+        let conditioner = conditioner.map(|settings| {
+            let publisher = Arc::clone(&publisher);
+            // What is lost here is lost like anything else on this way.
+            let put = move |bytes: Vec<u8>| drop(publisher.put(bytes).wait());
+            Link::new(settings.up, Delivery::Datagrams, settings.seed.rotate_left(32), put)
+        });
+        Ok(Self { publisher, conditioner, key_expr, session_key: accepted.session_key.clone(), outbox, shared })
     }
 
     /// Sends `controls` for the first tick that they can reach; answers their sequence number.
@@ -58,7 +74,10 @@ impl Wire {
         let (sequence, packet) = lock(&self.outbox).packet(controls, tick, newest, leave);
         let sealed = seal(&packet, &self.session_key, &self.key_expr);
         lock(&self.shared.inbox).note_sent(sequence, tick, sealed.len(), now);
-        self.publisher.put(sealed).await.map_err(ClientError::transport("send input"))?;
+        match &self.conditioner {
+            Some(link) => link.carry(sealed),
+            None => self.publisher.put(sealed).await.map_err(ClientError::transport("send input"))?,
+        }
         Ok(sequence)
     }
 }

@@ -14,7 +14,7 @@ use tokio::{
 };
 
 use super::{BotFleet, FleetSettings, Report, ScriptKind, progress};
-use crate::ClientError;
+use crate::{ClientError, ConditionerSettings};
 
 /// How often a server is looked for that does not answer.
 const RETRY_PERIOD: Duration = Duration::from_secs(1);
@@ -49,6 +49,10 @@ pub struct Args {
     /// Seed of everything random about the bots.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Make the network worse: latency, jitter (ms), loss, duplicate, reorder (per cent), rate (B/s), freeze (EVERY/FOR,
+    /// s), seed; before one of them `up.` or `down.` for one direction.
+    #[arg(long, value_name = "KEY=VALUE,..")]
+    conditioner: Option<ConditionerSettings>,
     /// How long to wait for a server to answer, s.
     #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u32).range(0..=86_400))]
     wait: u32,
@@ -90,6 +94,7 @@ async fn run(args: &Args) -> Result<Report, ClientError> {
         arena: args.arena.clone(),
         scripts: args.script.clone(),
         seed: args.seed,
+        conditioner: args.conditioner,
         ..FleetSettings::new(&args.connect)
     });
     let mut interrupted = watch_signals();

@@ -14,7 +14,7 @@ use super::{
     BotTally, FleetTally, ScriptKind,
     driver::{Driver, Meter},
 };
-use crate::{ClientError, Session, lock::lock, shared::StatisticsReader};
+use crate::{ClientError, ConditionerSettings, Session, lock::lock, shared::StatisticsReader};
 
 /// Connections that are opened at the same time. More would not be faster: opening is work for both sides.
 const OPENING_MAX: usize = 8;
@@ -34,6 +34,8 @@ pub struct FleetSettings {
     pub connect_timeout: Duration,
     /// As [`SessionBuilder::loss_timeout`](crate::SessionBuilder::loss_timeout).
     pub loss_timeout: Duration,
+    /// As [`SessionBuilder::conditioner`](crate::SessionBuilder::conditioner), each bot with a seed of its own.
+    pub conditioner: Option<ConditionerSettings>,
 }
 
 impl FleetSettings {
@@ -46,6 +48,7 @@ impl FleetSettings {
             seed: 1,
             connect_timeout: Duration::from_secs(5),
             loss_timeout: Duration::from_secs(3),
+            conditioner: None,
         }
     }
 
@@ -171,6 +174,13 @@ async fn connect(settings: FleetSettings, number: usize) -> Result<(usize, Sessi
         Some(arena) => builder.arena(arena),
         None => builder,
     };
-    let builder = builder.connect_timeout(settings.connect_timeout).loss_timeout(settings.loss_timeout);
+    let seeded = |conditions: ConditionerSettings| ConditionerSettings {
+        seed: conditions.seed.wrapping_add(number as u64),
+        ..conditions
+    };
+    let builder = builder
+        .connect_timeout(settings.connect_timeout)
+        .loss_timeout(settings.loss_timeout)
+        .conditioner(settings.conditioner.map(seeded));
     Ok((number, builder.interpolation(None).connect().await?))
 }

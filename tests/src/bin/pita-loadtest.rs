@@ -12,7 +12,9 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     match arguments.role {
         Some(Role::Serve { cores, arguments }) => server::serve(&cores, arguments),
-        Some(Role::Bots { connect, count, script }) => bots::run(&connect, count, script),
+        Some(Role::Bots { connect, count, script, conditioner }) => {
+            bots::run(&connect, count, script, conditioner.as_deref())
+        }
         None => measure(&arguments.options),
     }
 }

@@ -10,7 +10,7 @@ use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
 use pita_client::bots::{BotFleet, FleetSettings, FleetTally, ScriptKind};
-use pita_client::{ClientError, Durations};
+use pita_client::{ClientError, ConditionerSettings, Durations};
 use rustix::time::{ClockId, clock_gettime};
 use tokio::sync::mpsc;
 
@@ -38,13 +38,21 @@ pub struct Bots {
 }
 
 impl Bots {
-    /// Starts `count` bots that do `script` as a process of `program`, which is `pita-loadtest`.
+    /// Starts `count` bots that do `script` as a process of `program`, which is `pita-loadtest`; what their messages meet
+    /// is text of [`ConditionerSettings`].
     ///
     /// # Errors
     /// [`ProcessError::Start`].
-    pub fn start(program: &Path, endpoint: &str, count: usize, script: ScriptKind) -> Result<Self, ProcessError> {
+    pub fn start(
+        program: &Path,
+        endpoint: &str,
+        count: usize,
+        script: ScriptKind,
+        conditioner: Option<&str>,
+    ) -> Result<Self, ProcessError> {
         let mut command = Command::new(program);
         command.args(["bots", "--connect", endpoint, "--count", &count.to_string(), "--script", script.name()]);
+        conditioner.map(|conditions| command.args(["--conditioner", conditions]));
         Ok(Self { process: Process::start("the bots", &mut command)? })
     }
 
@@ -88,10 +96,13 @@ impl Bots {
 }
 
 /// Runs the bots in this process, until its standard input ends.
-pub fn run(endpoint: &str, count: usize, script: ScriptKind) -> ExitCode {
+pub fn run(endpoint: &str, count: usize, script: ScriptKind, conditioner: Option<&str>) -> ExitCode {
+    // Text that was no conditions did not get past the command line.
+    let conditioner: Option<ConditionerSettings> = conditioner.and_then(|text| text.parse().ok());
     let settings = FleetSettings {
         scripts: vec![script],
         seed: SEED,
+        conditioner,
         connect_timeout: CONNECT_TIMEOUT,
         ..FleetSettings::new(endpoint)
     };

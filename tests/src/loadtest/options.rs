@@ -4,6 +4,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use pita_client::ConditionerSettings;
 use pita_client::bots::ScriptKind;
 use pita_protocol::build_info::VERSION_AND_COMMIT;
 
@@ -34,6 +35,11 @@ pub struct Options {
     /// What the bots do
     #[arg(long, default_value = "wander")]
     pub script: ScriptKind,
+
+    /// Make the bots' network worse: latency, jitter (ms), loss, duplicate, reorder (per cent), rate (B/s), freeze
+    /// (EVERY/FOR, s), seed; before one of them `up.` or `down.` for one direction
+    #[arg(long, value_name = "KEY=VALUE,..", value_parser = checked_conditions)]
+    pub conditioner: Option<String>,
 
     /// Measure the server that runs at this endpoint instead of starting one
     #[arg(long, value_name = "ENDPOINT", conflicts_with_all = ["config", "arena", "cores"])]
@@ -85,5 +91,13 @@ pub enum Role {
         /// What they do.
         #[arg(long)]
         script: ScriptKind,
+        /// What their messages meet.
+        #[arg(long, value_parser = checked_conditions)]
+        conditioner: Option<String>,
     },
+}
+
+/// The text as it is, for the bots' process, once it is known to be good.
+fn checked_conditions(text: &str) -> Result<String, pita_client::ConditionsError> {
+    text.parse::<ConditionerSettings>().map(|_| text.to_owned())
 }

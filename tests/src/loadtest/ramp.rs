@@ -84,7 +84,7 @@ async fn measure(
 ) -> Result<Step, LoadTestError> {
     let progress = progress_bar(clients, options.ticks);
     let others = observer.status().await?.clients;
-    let mut bots = Bots::start(&this_program(), endpoint, clients, options.script)?;
+    let mut bots = Bots::start(&this_program(), endpoint, clients, options.script, options.conditioner.as_deref())?;
     progress.set_message("joining");
     bots.wait_until_joined(PATIENCE)?;
     progress.set_message("settling");

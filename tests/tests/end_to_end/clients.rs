@@ -48,7 +48,7 @@ pub fn ahead() -> Controls {
 /// `count` driving bots in a process of their own, all of them joined.
 pub fn bots_process(endpoint: &str, count: usize) -> Bots {
     let program = Path::new(env!("CARGO_BIN_EXE_pita-loadtest"));
-    let bots = Bots::start(program, endpoint, count, ScriptKind::Circle);
+    let bots = Bots::start(program, endpoint, count, ScriptKind::Circle, None);
     let mut bots = bots.unwrap_or_else(|error| panic!("{error}"));
     bots.wait_until_joined(SOON).unwrap_or_else(|error| panic!("{error}"));
     bots

@@ -11,7 +11,7 @@ use pita_tests::process::Signal;
 use tokio::sync::watch;
 
 use crate::clients::{ahead, bots_process, connect_three, next_snapshot};
-use crate::{await_clients, eventually, start_server};
+use crate::{await_clients, eventually, stalls_while, start_server};
 
 /// Clients that freeze: more than Zenoh has receive workers.
 const FROZEN: usize = 8;
@@ -21,9 +21,6 @@ const HEALTHY: usize = 3;
 
 /// How long the healthy clients are watched before, and after the last frozen one was closed.
 const WATCHED: Duration = Duration::from_secs(2);
-
-/// How often it is looked whether the machine stalled.
-const METRONOME: Duration = Duration::from_millis(5);
 
 /// By how many ticks frozen clients may delay the others' inputs.
 const DELAY_TICKS_MAX: u64 = 2;
@@ -73,19 +70,8 @@ async fn longest_gap(sessions: &[Session; HEALTHY], scene: impl Future<Output = 
         scene.await;
         over.send_replace(true);
     };
-    let (ann, bob, cid, stall, ()) = tokio::join!(ann, bob, cid, longest_stall(playing.clone()), play);
+    let (ann, bob, cid, stall) = tokio::join!(ann, bob, cid, stalls_while(play));
     (ann.max(bob).max(cid), stall)
-}
-
-/// How late a timer was at worst.
-async fn longest_stall(over: watch::Receiver<bool>) -> Duration {
-    let mut longest = Duration::ZERO;
-    while !*over.borrow() {
-        let due = Instant::now() + METRONOME;
-        tokio::time::sleep_until(due.into()).await;
-        longest = longest.max(due.elapsed());
-    }
-    longest
 }
 
 async fn longest_gap_of(session: &Session, over: watch::Receiver<bool>) -> u64 {

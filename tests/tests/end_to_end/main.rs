@@ -3,6 +3,7 @@
 //! Every test has a server of its own on a free port, so that tests and runs never meet. Every wait is for a condition
 //! and bounded.
 
+mod bad_network;
 mod clients;
 mod daemon;
 mod driving;
@@ -14,7 +15,7 @@ mod run;
 
 use std::future::Future;
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use pita_tests::observer::Observer;
 use pita_tests::server_process::ServerProcess;
@@ -27,6 +28,9 @@ const LONG: Duration = Duration::from_secs(60);
 
 /// How often a condition is looked at that nothing announces.
 const POLL: Duration = Duration::from_millis(20);
+
+/// How often it is looked whether the machine stalled.
+const METRONOME: Duration = Duration::from_millis(5);
 
 /// `pita-server` of this build.
 fn pita_server() -> Command {
@@ -64,6 +68,19 @@ async fn eventually<T, F: Future<Output = Option<T>>>(what: &str, mut check: imp
         }
     });
     waited.await.unwrap_or_else(|_| panic!("waited {SOON:?} in vain: {what}"))
+}
+
+/// Plays `scene`; answers how late a timer of this process was meanwhile, at worst.
+async fn stalls_while(scene: impl Future<Output = ()>) -> Duration {
+    let mut longest = Duration::ZERO;
+    let mut scene = std::pin::pin!(scene);
+    loop {
+        let due = Instant::now() + METRONOME;
+        tokio::select! {
+            () = &mut scene => return longest,
+            () = tokio::time::sleep_until(due.into()) => longest = longest.max(due.elapsed()),
+        }
+    }
 }
 
 /// Waits until the server has so many sessions.
