@@ -8,7 +8,7 @@ use crate::autodiff::Dual;
 use crate::dof::{BLOCK_RATES_MAX, Frame, Node, Twist};
 use crate::potential::axle::AxleTerm;
 use crate::potential::ball_joint::BallJointTerm;
-use crate::potential::contact::ContactTerm;
+use crate::potential::contact::{ContactTerm, Slide};
 use crate::potential::fixed_joint::FixedJointTerm;
 use crate::potential::gravity::Gravity;
 use crate::potential::hinge::HingeTerm;
@@ -288,15 +288,18 @@ impl Problem {
         tangents.clear();
         tangents.resize(moving.len(), Wrench::ZERO);
         terms.visit(&mut Product { dt: *dt, moving, tangents });
-        for (entry, tangent) in y.iter_mut().zip(tangents.iter()) {
-            add_wrench(entry, *tangent, *dt);
+        for (frame, tangent) in (0..).zip(tangents.iter()) {
+            pull_back(figures, frame, *tangent, *dt, y);
         }
-        for (k, tangent) in tangents[x.len()..].iter().enumerate() {
-            let numbers = tangent.numbers();
-            for influence in figures.influences(k) {
-                for (entry, column) in y[influence.block as usize].iter_mut().zip(&influence.columns) {
-                    *entry += *dt * (0..6).map(|i| column[i] * numbers[i]).sum::<f64>();
-                }
+    }
+
+    /// y += C x, C what `slides` say.
+    pub(super) fn add_slide_product<const D: usize>(&self, slides: &[Slide], x: &[Entry<D>], y: &mut [Entry<D>]) {
+        let along = Propose { step: x, figures: &self.figures, dt: self.dt };
+        for slide in slides {
+            let changes = slide.change(slide.frames.map(|frame| along.displacement(frame)));
+            for (frame, change) in slide.frames.into_iter().zip(changes) {
+                pull_back(&self.figures, frame, change, self.dt, y);
             }
         }
     }
@@ -349,6 +352,20 @@ impl Problem {
 /// Frames of a term.
 pub(super) fn pair<'a, T: Term>(frames: &'a [Frame<f64>], term: &T) -> [&'a Frame<f64>; 2] {
     term.frames().map(|i| frames.get(i as usize).unwrap_or(&Frame::WORLD))
+}
+
+/// y += `factor` Jᵀ w, J the derivative of a frame.
+fn pull_back<const D: usize>(figures: &Figures, frame: FrameIndex, w: Wrench, factor: f64, y: &mut [Entry<D>]) {
+    if let Some(entry) = y.get_mut(frame as usize) {
+        add_wrench(entry, w, factor);
+    } else if frame != FIXED {
+        let numbers = w.numbers();
+        for influence in figures.influences(frame as usize - y.len()) {
+            for (entry, column) in y[influence.block as usize].iter_mut().zip(&influence.columns) {
+                *entry += factor * (0..6).map(|i| column[i] * numbers[i]).sum::<f64>();
+            }
+        }
+    }
 }
 
 /// Multiplies the blocks of figures with a vector.

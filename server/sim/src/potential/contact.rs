@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3};
 
 use super::{FIXED, FrameIndex, PairBlocks, Term, Wrench, outer};
 use crate::autodiff::{Scalar, Vec3};
-use crate::dof::Frame;
+use crate::dof::{Frame, Twist};
 use crate::settings::ContactSettings;
 
 /// Slip at which friction is saturated, in units of limit / stiffness: where x − 4/27 x³ peaks.
@@ -175,6 +175,49 @@ impl ContactTerm {
         let (slip, length, _) = self.slip(self.displacement(dt, at));
         let reach = SATURATION * self.friction * self.normal_force(dt, at) / self.tangent_stiffness;
         DVec3::from(slip) * if length > reach { reach / length } else { 1.0 }
+    }
+}
+
+/// How friction at a contact changes beyond what [`Term::hessian`] says: with the normal force, and along the slip by the
+/// share of the tangent that is left out there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Slide {
+    pub frames: [FrameIndex; 2],
+    arms: [DVec3; 2],
+    normal: DVec3,
+    /// Unit vector along the slip.
+    direction: DVec3,
+    /// Of friction, with the depth, N/m.
+    by_depth: f64,
+    /// Of friction, with the slip, N/m.
+    by_slip: f64,
+}
+
+impl Slide {
+    /// Change of the gradient on both ends, given the displacements of their frames.
+    pub fn change(&self, [a, b]: [Twist; 2]) -> [Wrench; 2] {
+        let displacement = b.at(self.arms[1]) - a.at(self.arms[0]);
+        let along = self.by_slip * self.direction.dot(displacement) - self.by_depth * self.normal.dot(displacement);
+        let force = Vec3::constant(self.direction * along);
+        [Wrench::at_fixed(-force, self.arms[0]), Wrench::at_fixed(force, self.arms[1])]
+    }
+}
+
+impl ContactTerm {
+    /// How friction changes beyond the Hessian; `None` where it sticks or there is none.
+    pub fn slide(&self, dt: f64, at: [&Frame<f64>; 2]) -> Option<Slide> {
+        let displacement = self.displacement(dt, at);
+        let (slip, length, x) = self.slip(displacement);
+        if self.limit <= 0.0 || length <= 0.0 {
+            return None;
+        }
+        let (value, slope) = (friction_patch(x).1, friction_slope(x));
+        let normal_slope = self.normal_stiffness * normal_slope(self.depth(displacement), self.transition);
+        // µ N p(x / N): what is left of the product rule once x = slip × stiffness / limit has changed too.
+        let by_depth = self.friction * normal_slope * (value - x * slope);
+        let by_slip = (1.0 - TANGENT_SHARE) * self.tangent_stiffness * (slope - value / x);
+        let Self { frames, arms, normal, .. } = *self;
+        Some(Slide { frames, arms, normal, direction: DVec3::from(slip) / length, by_depth, by_slip })
     }
 }
 

@@ -7,10 +7,11 @@
 
 use super::super::block::Entry;
 use super::super::matrix::Matrix;
+use super::super::problem::Problem;
 use super::method::Preconditioner;
 use super::newton::Newton;
 use super::truncated_newton::TruncatedNewton;
-use super::work::{block, block_product};
+use super::work::{Work, block, block_product};
 use super::{Solver, Standpoint};
 
 /// Iterations of conjugate gradients that a Newton iteration of a large island is expected to take.
@@ -32,6 +33,8 @@ pub(super) struct Auto<const D: usize> {
     direct_work: Option<u64>,
     /// Iterations of conjugate gradients in the last Newton iteration.
     linear_iterations: u64,
+    /// The last direction was a direct solution.
+    was_direct: bool,
 }
 
 impl<const D: usize> Solver<D> for Auto<D> {
@@ -45,13 +48,18 @@ impl<const D: usize> Solver<D> for Auto<D> {
             self.truncated.analyse(at.matrix, Preconditioner::IncompleteFactorization, at.settings);
         }
         let truncated = truncated_work(at.matrix, self.linear_iterations);
-        if self.direct_work.is_some_and(|direct| direct <= truncated) {
+        self.was_direct = self.direct_work.is_some_and(|direct| direct <= truncated);
+        if self.was_direct {
             self.newton.descend(&mut at, step);
             return 1;
         }
         let iterations = self.truncated.descend(&mut at, step);
         self.linear_iterations = iterations as u64;
         iterations
+    }
+
+    fn follow_friction(&mut self, problem: &Problem, work: &mut Work, step: &mut [Entry<D>]) -> usize {
+        if self.was_direct { self.newton.follow_friction(problem, work, step) } else { 0 }
     }
 }
 

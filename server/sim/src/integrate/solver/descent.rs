@@ -6,7 +6,7 @@ use super::super::matrix::Matrix;
 use super::super::problem::Problem;
 use super::super::vector::{add_scaled, inner};
 use super::guess::guess;
-use super::watchdog::{Standing, Verdict, Watchdog};
+use super::watchdog::{Slopes, Standing, Verdict, Watchdog};
 use super::work::Work;
 use super::{SolveReport, Solver, Standpoint, StoppedBecause};
 use crate::settings::SolverSettings;
@@ -28,6 +28,12 @@ const STIFFENING_ROUNDS: usize = 6;
 /// of a repeated guess repeats: it makes what slides slide too slowly by the tolerance in every tick.
 const GUESS_SHARE: f64 = 0.3;
 
+/// First iteration that friction's tangent comes in: what slides, and which way, has to be seen before.
+const FRICTION_FROM: usize = 3;
+
+/// A step with friction's tangent is good if it shrinks the residual to this fraction.
+const FRICTION_SHRINK: f64 = 0.7;
+
 /// The state of a solve, kept from solve to solve for its memory.
 #[derive(Default)]
 pub(super) struct Descent<const D: usize> {
@@ -36,6 +42,11 @@ pub(super) struct Descent<const D: usize> {
     start: Vec<Entry<D>>,
     residual: Vec<Entry<D>>,
     step: Vec<Entry<D>>,
+    /// The step as it was before friction came into it.
+    symmetric_step: Vec<Entry<D>>,
+    /// Friction's tangent comes in at this iteration; later each time that it was of no use.
+    friction_from: usize,
+    friction_failures: usize,
     best: Best<D>,
     watchdog: Watchdog<D>,
     matrix: Matrix<D>,
@@ -104,16 +115,17 @@ impl<const D: usize> Descent<D> {
     ) -> SolveReport {
         let mut work = Work::begin::<D>(problem, budget);
         let mut report = SolveReport::default();
-        guess(problem, settings, &mut work, &mut self.u, &mut self.start, &mut self.residual);
+        report.merit = guess(problem, settings, &mut work, &mut self.u, &mut self.start, &mut self.residual);
         self.best.forget();
         self.watchdog.begin(method.walk() == Walk::NEWTON && problem.bends());
+        (self.friction_from, self.friction_failures) = (FRICTION_FROM, 0);
         let mut goal = Goal { residual: settings.tolerance * problem.dt, iterations: settings.iterations() };
         let mut rounds = 0;
         loop {
-            self.relinearise(problem, &mut work, &mut report);
+            self.stand(problem, &mut work, &mut report);
             if self.watchdog.judge(report.standing()) == Verdict::GoBack {
-                self.walk_again(method, problem, &mut work);
-                self.relinearise(problem, &mut work, &mut report);
+                report.merit = self.walk_again(problem, &mut work);
+                self.stand(problem, &mut work, &mut report);
             }
             if let Some(reason) = self.reason_to_stop(goal, &work, &report) {
                 let solved = reason == StoppedBecause::Tolerance;
@@ -121,6 +133,7 @@ impl<const D: usize> Descent<D> {
                     goal.iterations = report.iterations + settings.iterations();
                     rounds += 1;
                     self.best.forget();
+                    report.merit = self.relinearise(problem, &mut work);
                     continue;
                 }
                 report.stopped_because = reason;
@@ -132,24 +145,30 @@ impl<const D: usize> Descent<D> {
             let at = Standpoint { problem, u, residual, matrix, settings, work: &mut work, iteration };
             report.linear_iterations += method.direction(at, step);
             report.iterations += 1;
-            let moved = self.walk(method, problem, &mut work, report.standing());
+            let walked = self.follow_friction(method, problem, &mut work, &mut report);
+            let walked = walked.or_else(|| self.walk(method, problem, &mut work, report.standing()));
             work.iteration_took(work.multiply_adds() - before);
-            if !moved {
-                self.relinearise(problem, &mut work, &mut report);
-                report.stopped_because =
-                    self.reason_to_stop(goal, &work, &report).unwrap_or(StoppedBecause::Stagnation);
-                break;
+            match walked {
+                Some(merit) => report.merit = merit,
+                None => {
+                    report.stopped_because = StoppedBecause::Stagnation;
+                    break;
+                }
             }
         }
         self.return_to_best(problem, &mut report);
         SolveReport { evaluations: work.evaluations(), work: work.spent(), ..report }
     }
 
-    /// Takes anew what is frozen during an iteration, and sees how good the state is.
-    fn relinearise(&mut self, problem: &mut Problem, work: &mut Work, report: &mut SolveReport) {
-        report.merit = problem.relinearise_and_evaluate(&mut self.residual);
+    /// Takes anew what is frozen during an iteration, and evaluates. Answers the incremental potential, J.
+    fn relinearise(&mut self, problem: &mut Problem, work: &mut Work) -> f64 {
         work.told_potentials();
         work.evaluated();
+        problem.relinearise_and_evaluate(&mut self.residual)
+    }
+
+    /// Sees how good the state is.
+    fn stand(&mut self, problem: &Problem, work: &mut Work, report: &mut SolveReport) {
         report.residual = problem.residual_speed(&self.residual);
         work.vectors(VECTORS_AN_ITERATION);
         self.best.offer(&self.u, report.merit, report.residual);
@@ -169,60 +188,133 @@ impl<const D: usize> Descent<D> {
         (!work.affords_iteration()).then_some(StoppedBecause::Budget)
     }
 
-    /// Walks along the step from a state that is as good as `standing`; leaves `u` and the trial where it ends. Answers
-    /// whether that is elsewhere.
-    fn walk(&mut self, method: &mut dyn Solver<D>, problem: &mut Problem, work: &mut Work, standing: Standing) -> bool {
+    /// Tries the step that knows how friction follows the load. Answers the incremental potential where it ends, J, or
+    /// nothing where the residual does not shrink: then all is as it was.
+    fn follow_friction(
+        &mut self,
+        method: &mut dyn Solver<D>,
+        problem: &mut Problem,
+        work: &mut Work,
+        report: &mut SolveReport,
+    ) -> Option<f64> {
+        if report.iterations < self.friction_from {
+            return None;
+        }
+        self.symmetric_step.clone_from(&self.step);
+        let iterations = method.follow_friction(problem, work, &mut self.step);
+        if iterations == 0 {
+            return None;
+        }
+        report.linear_iterations += iterations;
+        problem.propose(&self.step);
+        work.told_potentials();
+        self.start.clone_from(&self.u);
+        self.go(1.0, problem, work);
+        let merit = self.relinearise(problem, work);
+        let residual = problem.residual_speed(&self.residual);
+        work.vectors(1);
+        if residual < FRICTION_SHRINK * report.residual {
+            return Some(merit);
+        }
+        self.friction_failures += 1;
+        self.friction_from = report.iterations + 1 + self.friction_failures;
+        self.u.clone_from(&self.start);
+        self.step.clone_from(&self.symmetric_step);
+        problem.move_to(&self.u);
+        self.relinearise(problem, work);
+        work.moved();
+        None
+    }
+
+    /// Walks along the step from a state that is as good as `standing`; leaves `u`, the trial and the residual where it
+    /// ends. Answers the incremental potential there, J, or nothing if that is nowhere else.
+    fn walk(
+        &mut self,
+        method: &mut dyn Solver<D>,
+        problem: &mut Problem,
+        work: &mut Work,
+        standing: Standing,
+    ) -> Option<f64> {
         let slope = inner(&self.residual, &self.step);
         let descends = slope < 0.0;
         if !descends {
-            return false;
+            return None;
         }
-        let bold = self.watchdog.is_bold();
-        let walk = if bold { Walk::FULL } else { method.walk() };
-        self.search(method, problem, work, walk);
-        if bold && !method.walk().ends_at(slope, inner(&self.residual, &self.step)) {
-            self.watchdog.overstepped(&self.start, standing, &self.step, slope);
-        }
+        problem.propose(&self.step);
+        work.told_potentials();
+        self.start.clone_from(&self.u);
+        let merit = if method.walk() == Walk::NEWTON {
+            self.walk_as_model_says(problem, work, standing, slope)
+        } else {
+            self.search(method, problem, work, slope);
+            self.relinearise(problem, work)
+        };
         let Self { u, start, .. } = self;
         let largest = u.as_flattened().iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
-        u.as_flattened().iter().zip(start.as_flattened()).any(|(now, before)| {
+        let moved = u.as_flattened().iter().zip(start.as_flattened()).any(|(now, before)| {
             let still = (now - before).abs() <= STANDSTILL * largest;
             !still
-        })
+        });
+        moved.then_some(merit)
+    }
+
+    /// Takes the full step, and shortens it where that went too far, unless the watchdog wants to see where it leads.
+    fn walk_as_model_says(&mut self, problem: &mut Problem, work: &mut Work, standing: Standing, slope: f64) -> f64 {
+        self.go(1.0, problem, work);
+        let merit = self.relinearise(problem, work);
+        let end = inner(&self.residual, &self.step);
+        if Walk::NEWTON.ends_at(slope, end) {
+            return merit;
+        }
+        if self.watchdog.is_bold() && end.is_finite() {
+            self.watchdog.overstepped(&self.start, standing, &self.step, Slopes { start: slope, end });
+            return merit;
+        }
+        self.shorten(problem, work, Slopes { start: slope, end })
     }
 
     /// Goes back to where the watchdog's trial began, and from there no farther than the line search says.
-    fn walk_again(&mut self, method: &mut dyn Solver<D>, problem: &mut Problem, work: &mut Work) {
-        let (u, step) = self.watchdog.go_back();
-        self.u.clear();
-        self.u.extend_from_slice(u);
+    fn walk_again(&mut self, problem: &mut Problem, work: &mut Work) -> f64 {
+        let (u, step, slopes) = self.watchdog.go_back();
+        self.start.clear();
+        self.start.extend_from_slice(u);
         self.step.clear();
         self.step.extend_from_slice(step);
-        problem.move_to(&self.u);
-        problem.relinearise_and_evaluate(&mut self.residual);
-        work.told_potentials();
-        work.moved_and_evaluated();
-        let walk = method.walk();
-        self.search(method, problem, work, walk);
+        self.shorten(problem, work, slopes)
     }
 
-    /// Searches along the step; leaves `u`, the trial and the residual where that ends.
-    fn search(&mut self, method: &mut dyn Solver<D>, problem: &mut Problem, work: &mut Work, walk: Walk) {
-        let Self { u, start, residual, step, .. } = self;
-        let slope = inner(residual, step);
-        problem.propose(step);
+    /// Walks along the step from `start`, whose full length is too far.
+    fn shorten(&mut self, problem: &mut Problem, work: &mut Work, slopes: Slopes) -> f64 {
+        problem.move_to(&self.start);
+        self.relinearise(problem, work);
+        problem.propose(&self.step);
         work.told_potentials();
-        start.clone_from(u);
-        let alpha = line_search::search(slope, walk, |alpha| {
-            u.clone_from(start);
-            add_scaled(u, alpha, step);
-            problem.move_to(u);
-            problem.evaluate(residual);
-            work.moved_and_evaluated();
-            work.vectors(VECTORS_A_TRIAL);
-            inner(residual, step)
-        });
-        method.walked(alpha, step, residual);
+        line_search::shorten(slopes.start, slopes.end, Walk::NEWTON, |alpha| self.slope_at(alpha, problem, work));
+        self.relinearise(problem, work)
+    }
+
+    /// Searches along the step from `start`.
+    fn search(&mut self, method: &mut dyn Solver<D>, problem: &mut Problem, work: &mut Work, slope: f64) {
+        let alpha = line_search::search(slope, method.walk(), |alpha| self.slope_at(alpha, problem, work));
+        method.walked(alpha, &self.step, &self.residual);
+    }
+
+    /// The directional derivative so many steps from `start`, with what is frozen left as it is, J.
+    fn slope_at(&mut self, alpha: f64, problem: &mut Problem, work: &mut Work) -> f64 {
+        self.go(alpha, problem, work);
+        problem.evaluate(&mut self.residual);
+        work.evaluated();
+        inner(&self.residual, &self.step)
+    }
+
+    /// Moves `u` and the trial so many steps from `start`.
+    fn go(&mut self, alpha: f64, problem: &mut Problem, work: &mut Work) {
+        let Self { u, start, step, .. } = self;
+        u.clone_from(start);
+        add_scaled(u, alpha, step);
+        problem.move_to(u);
+        work.moved();
+        work.vectors(VECTORS_A_TRIAL);
     }
 
     /// One body's overflow must not spread over its island, nor a last step that went wrong.

@@ -6,7 +6,8 @@ use super::work::Work;
 use crate::settings::SolverSettings;
 
 /// Moves `u` and the trial to the first of the guesses that is within the tolerance as it is, else to the cheapest in
-/// incremental potential. `scratch` and `residual` are memory.
+/// incremental potential, and takes there what is frozen during an iteration. Answers the potential, J, and leaves its
+/// gradient in `residual`. `scratch` is memory.
 pub(super) fn guess<const D: usize>(
     problem: &mut Problem,
     settings: &SolverSettings,
@@ -14,25 +15,29 @@ pub(super) fn guess<const D: usize>(
     u: &mut Vec<Entry<D>>,
     scratch: &mut Vec<Entry<D>>,
     residual: &mut Vec<Entry<D>>,
-) {
+) -> f64 {
     let mut least = f64::NAN;
     let mut is_last = true;
     for &guess in problem.guesses() {
         problem.guess(guess, scratch);
         problem.move_to(scratch);
-        let energy = problem.evaluate(residual);
+        let energy = problem.relinearise_and_evaluate(residual);
         work.moved_and_evaluated();
+        work.told_potentials();
         is_last = energy < least || least.is_nan();
         if is_last {
             least = energy;
             std::mem::swap(u, scratch);
             if problem.residual_speed(residual) <= settings.tolerance * problem.dt {
-                return;
+                return least;
             }
         }
     }
     if !is_last {
         problem.move_to(u);
-        work.moved();
+        least = problem.relinearise_and_evaluate(residual);
+        work.moved_and_evaluated();
+        work.told_potentials();
     }
+    least
 }

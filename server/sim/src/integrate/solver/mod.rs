@@ -39,6 +39,12 @@ pub(super) trait Solver<const D: usize> {
     /// that this took. The first call of a solve has [`Standpoint::iteration`] 0: nothing holds from before.
     fn direction(&mut self, at: Standpoint<D>, step: &mut Vec<Entry<D>>) -> usize;
 
+    /// Makes of the direction that it gave last one that knows how friction changes with the load; that is no direction
+    /// of descent. Answers the iterations that this took, 0 if it did nothing.
+    fn follow_friction(&mut self, _problem: &Problem, _work: &mut Work, _step: &mut [Entry<D>]) -> usize {
+        0
+    }
+
     /// Hears how far the line search went, in steps, and of the residual there, before anything is taken anew.
     fn walked(&mut self, _alpha: f64, _step: &[Entry<D>], _residual: &[Entry<D>]) {}
 

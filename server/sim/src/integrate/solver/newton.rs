@@ -4,7 +4,9 @@
 
 use super::super::block::Entry;
 use super::super::factorization::{Factorised, Factorization, Fill};
+use super::super::friction_tangent::FrictionTangent;
 use super::super::matrix::Matrix;
+use super::super::problem::Problem;
 use super::super::vector::negate;
 use super::work::{Work, block_product};
 use super::{Solver, Standpoint};
@@ -13,6 +15,7 @@ use super::{Solver, Standpoint};
 #[derive(Default)]
 pub(super) struct Newton<const D: usize> {
     factorization: Factorization<D>,
+    friction: FrictionTangent<D>,
 }
 
 impl<const D: usize> Newton<D> {
@@ -62,5 +65,9 @@ impl<const D: usize> Solver<D> for Newton<D> {
         }
         self.descend(&mut at, step);
         1
+    }
+
+    fn follow_friction(&mut self, problem: &Problem, work: &mut Work, step: &mut [Entry<D>]) -> usize {
+        self.friction.correct(problem, &self.factorization, work, step)
     }
 }

@@ -46,8 +46,16 @@ pub(super) struct Watchdog<const D: usize> {
     u: Vec<Entry<D>>,
     step: Vec<Entry<D>>,
     start: Standing,
-    /// Of the incremental potential along the step, negative, J.
-    slope: f64,
+    slopes: Slopes,
+}
+
+/// Of the incremental potential along a step, J.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Slopes {
+    /// Where it starts, negative.
+    pub start: f64,
+    /// Where it ends.
+    pub end: f64,
 }
 
 /// What becomes of a trial.
@@ -70,15 +78,15 @@ impl<const D: usize> Watchdog<D> {
         !self.tired
     }
 
-    /// Hears that a full step from `u`, along which the potential had a `slope`, led to where a line search would have
+    /// Hears that a full step from `u`, along which the potential had these `slopes`, led to where a line search would have
     /// shortened it.
-    pub fn overstepped(&mut self, u: &[Entry<D>], start: Standing, step: &[Entry<D>], slope: f64) {
+    pub fn overstepped(&mut self, u: &[Entry<D>], start: Standing, step: &[Entry<D>], slopes: Slopes) {
         if !self.is_on {
             self.u.clear();
             self.u.extend_from_slice(u);
             self.step.clear();
             self.step.extend_from_slice(step);
-            (self.start, self.slope) = (start, slope);
+            (self.start, self.slopes) = (start, slopes);
             (self.is_on, self.steps) = (true, 0);
         }
     }
@@ -89,7 +97,7 @@ impl<const D: usize> Watchdog<D> {
             return Verdict::GoOn;
         }
         self.steps += 1;
-        let gained = now.merit < self.start.merit + GAIN * self.slope;
+        let gained = now.merit < self.start.merit + GAIN * self.slopes.start;
         let good = gained || now.residual < SHRINK * self.start.residual;
         let converges = now.residual < CONVERGING * std::mem::replace(&mut self.last, now.residual);
         let goes_on = self.steps < STEPS || self.steps < STEPS + MORE_STEPS && converges;
@@ -98,15 +106,17 @@ impl<const D: usize> Watchdog<D> {
     }
 
     /// Where the trial began, and its first step; it has been the last one.
-    pub fn go_back(&mut self) -> (&[Entry<D>], &[Entry<D>]) {
+    pub fn go_back(&mut self) -> (&[Entry<D>], &[Entry<D>], Slopes) {
         self.tired = true;
-        (&self.u, &self.step)
+        (&self.u, &self.step, self.slopes)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const SLOPES: Slopes = Slopes { start: -1.0, end: 1.0 };
 
     fn at(merit: f64, residual: f64) -> Standing {
         Standing { merit, residual }
@@ -118,17 +128,18 @@ mod tests {
         dog.begin(true);
         assert_eq!(dog.judge(at(9.0, 9.0)), Verdict::GoOn);
         for good in [at(9.0, 0.4), at(0.7, 9.0)] {
-            dog.overstepped(&[[1.0; 3]], at(1.0, 1.0), &[[2.0; 3]], -1.0);
+            dog.overstepped(&[[1.0; 3]], at(1.0, 1.0), &[[2.0; 3]], SLOPES);
             assert_eq!(dog.judge(at(9.0, 9.0)), Verdict::GoOn);
             assert_eq!(dog.judge(good), Verdict::GoOn);
         }
-        dog.overstepped(&[[3.0; 3]], at(1.0, 1.0), &[[4.0; 3]], -1.0);
+        dog.overstepped(&[[3.0; 3]], at(1.0, 1.0), &[[4.0; 3]], SLOPES);
         assert_eq!(dog.judge(at(9.0, 9.0)), Verdict::GoOn);
-        dog.overstepped(&[[5.0; 3]], at(9.0, 9.0), &[[6.0; 3]], -1.0);
+        dog.overstepped(&[[5.0; 3]], at(9.0, 9.0), &[[6.0; 3]], SLOPES);
         assert_eq!(dog.judge(at(0.8, 0.8)), Verdict::GoOn, "it converges");
         assert_eq!(dog.judge(at(0.8, 0.6)), Verdict::GoBack);
         assert!(dog.is_bold());
-        assert_eq!(dog.go_back(), (&[[3.0; 3]][..], &[[4.0; 3]][..]));
+        let (u, step, _) = dog.go_back();
+        assert_eq!((u, step), (&[[3.0; 3]][..], &[[4.0; 3]][..]));
         assert!(!dog.is_bold());
     }
 }
