@@ -74,6 +74,12 @@ pub enum WireError {
     /// The seal does not match body, key expression and session key.
     #[error("message authentication failed")]
     Forged,
+    /// A snapshot is coded against one that this side does not have.
+    #[error("the snapshot's baseline is not there")]
+    NoBaseline,
+    /// A snapshot decoded to another state than the sender has.
+    #[error("the decoded state differs from the sender's")]
+    Desync,
     /// Arena names are part of key expressions.
     #[error("arena name must be 1 to 32 of a-z 0-9 - _")]
     ArenaName,

@@ -8,6 +8,7 @@
 
 pub mod build_info;
 pub mod codec;
+pub mod dof;
 pub mod input;
 pub mod keys;
 pub mod message;

@@ -1,0 +1,162 @@
+//! The state of a whole stream at a tick: what one side knows that the other has.
+
+use super::predict::GroupState;
+use super::quantise::{Group, Precision, Quantised};
+use super::residual::Models;
+use crate::{WireError, codec::require};
+
+/// Most bodies of a stream.
+pub const BODIES_MAX: usize = 16_384;
+/// Most groups of a stream.
+pub const GROUPS_MAX: usize = 65_536;
+/// Most groups of a body.
+pub const BODY_GROUPS_MAX: usize = 255;
+
+/// A body of a state, or of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Body {
+    /// Names it for as long as it lives; never used twice in a run.
+    pub id: u32,
+    /// What its numbers mean; see the kinds of [`crate::dof`].
+    pub kind: u8,
+    /// The body in whose frame its first point and rotation are. It comes before.
+    pub parent: Option<u32>,
+    /// Where its groups start.
+    pub(super) start: u32,
+    /// How many groups it has.
+    pub(super) groups: u8,
+}
+
+/// Everything at one tick in steps, in order of id: what is coded, once for all streams.
+#[derive(Clone, Debug)]
+pub struct State {
+    precision: Precision,
+    bodies: Vec<Body>,
+    groups: Vec<Quantised>,
+}
+
+impl State {
+    /// An empty state.
+    ///
+    /// # Errors
+    /// [`WireError::Content`] for a precision out of range.
+    pub fn new(precision: Precision) -> Result<Self, WireError> {
+        precision.check()?;
+        Ok(Self { precision, bodies: Vec::new(), groups: Vec::new() })
+    }
+
+    /// Forgets all bodies, and keeps the memory.
+    pub fn clear(&mut self) {
+        self.bodies.clear();
+        self.groups.clear();
+    }
+
+    /// How fine the steps are.
+    pub fn precision(&self) -> &Precision {
+        &self.precision
+    }
+
+    /// Appends a body. `numbers` are as many as `layout` says, in its order; of an attached body they are
+    /// [relative](super::relative) to its parent.
+    ///
+    /// # Errors
+    /// [`WireError::Content`] where ids do not ascend, a parent does not come before, or there is too much.
+    pub fn push(
+        &mut self,
+        id: u32,
+        kind: u8,
+        parent: Option<u32>,
+        layout: &[Group],
+        numbers: &[f64],
+    ) -> Result<(), WireError> {
+        require(self.bodies.last().is_none_or(|last| last.id < id), "slice id", "ascending")?;
+        require(parent.is_none_or(|parent| self.find(parent).is_some()), "parent", "an earlier body")?;
+        require(self.bodies.len() < BODIES_MAX, "bodies", "at most 16384")?;
+        require(self.groups.len() + layout.len() <= GROUPS_MAX, "groups", "at most 65536")?;
+        require((1..=BODY_GROUPS_MAX).contains(&layout.len()), "groups of a body", "1 to 255")?;
+        let count: usize = layout.iter().map(|group| group.numbers()).sum();
+        require(numbers.len() == count, "numbers of a body", "as many as its layout says")?;
+        let (start, groups) = (self.groups.len() as u32, layout.len() as u8);
+        let mut rest = numbers;
+        for &group in layout {
+            let (own, others) = rest.split_at(group.numbers());
+            self.groups.push(Quantised::of(group, own, &self.precision));
+            rest = others;
+        }
+        self.bodies.push(Body { id, kind, parent, start, groups });
+        Ok(())
+    }
+
+    /// All bodies, in order of id.
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    /// Groups of a body of this state.
+    pub fn groups(&self, body: &Body) -> &[Quantised] {
+        &self.groups[body.start as usize..][..body.groups.into()]
+    }
+
+    pub(super) fn find(&self, id: u32) -> Option<&Body> {
+        self.bodies.binary_search_by_key(&id, |body| body.id).ok().map(|at| &self.bodies[at])
+    }
+}
+
+/// What a receiver has after a snapshot: of every body the newest state that it was sent, and the models.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    pub(super) tick: u64,
+    pub(super) precision: Precision,
+    pub(super) bodies: Vec<Body>,
+    /// Tick of each body's state.
+    pub(super) ticks: Vec<u64>,
+    pub(super) groups: Vec<GroupState>,
+    pub(super) models: Box<Models>,
+}
+
+impl Frame {
+    /// Nothing at all: what a snapshot without a baseline starts from.
+    pub fn empty(precision: Precision) -> Self {
+        Self { tick: 0, precision, bodies: Vec::new(), ticks: Vec::new(), groups: Vec::new(), models: Box::default() }
+    }
+
+    /// Tick of the snapshot.
+    pub fn tick(&self) -> u64 {
+        self.tick
+    }
+
+    /// How fine its steps are.
+    pub fn precision(&self) -> &Precision {
+        &self.precision
+    }
+
+    /// All bodies that the receiver has, in order of id, each with the tick of its state.
+    pub fn bodies(&self) -> impl ExactSizeIterator<Item = (&Body, u64)> {
+        self.bodies.iter().zip(self.ticks.iter().copied())
+    }
+
+    /// The body with this id.
+    pub fn find(&self, id: u32) -> Option<&Body> {
+        self.bodies.binary_search_by_key(&id, |body| body.id).ok().map(|at| &self.bodies[at])
+    }
+
+    /// Groups of a body of this frame.
+    pub fn groups(&self, body: &Body) -> &[GroupState] {
+        &self.groups[body.start as usize..][..body.groups.into()]
+    }
+
+    /// Hash of all that the receiver has, folded to 16 bits: a desync is noticed at once.
+    pub fn check(&self) -> u16 {
+        let mut hash = 0u32;
+        let mut add = |x: u32| hash = (hash.rotate_left(5) ^ x).wrapping_mul(0x9E37_79B9);
+        for (body, tick) in self.bodies() {
+            add(body.id);
+            add(tick as u32);
+            for group in self.groups(body) {
+                add(group.value.largest.into());
+                group.value.steps.iter().for_each(|&s| add(s as u32));
+            }
+        }
+        (hash ^ hash >> 16) as u16
+    }
+}

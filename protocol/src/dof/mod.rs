@@ -1,0 +1,49 @@
+//! DOF streams: Q as integers, predicted along Q', entropy-coded, safe under loss.
+//!
+//! ```text
+//!  State ── quantise ──▶ steps ──┐
+//!                                ├─ walk ── residual ── model ── range_coder ──▶ bytes
+//!  Frame (baseline) ── predict ──┘             the same walk reads ◀─────────────┘
+//! ```
+//!
+//! Owns quantisation ([`State`], [`Precision`]), prediction, the adaptive models and both ends of a stream ([`Encoder`],
+//! [`Decoder`]). It may touch nothing but bytes: no I/O, no clock, no engine. What both sides compute is integer
+//! arithmetic in one function for both directions, so they cannot disagree; floating point stays outside, in
+//! quantisation and in what a [`Frame`] is turned into for its user. `protocol/PROTOCOL.md` specifies all of it.
+//!
+//! Kinds of bodies, by [`Body::kind`], are the [`kind`]s below. Whatever the kind, a body is a row of [`Group`]s.
+
+mod frame;
+mod model;
+mod predict;
+mod quantise;
+mod quaternion;
+mod range_coder;
+mod residual;
+mod stream;
+#[cfg(test)]
+mod tests;
+mod walk;
+
+pub use frame::{BODIES_MAX, Body, Frame, GROUPS_MAX, State};
+pub use predict::GroupState;
+pub use quantise::{Group, Precision, Quantised, absolute, relative, rotate};
+pub use stream::{Decoder, Encoder, HISTORY};
+
+/// What the numbers of a body mean.
+pub mod kind {
+    /// A point.
+    pub const PARTICLE: u8 = 0;
+    /// Centre of mass and rotation.
+    pub const RIGID_BODY: u8 = 1;
+    /// Joint coordinates: points, rotations and scalars as the figure's joints are.
+    pub const ARTICULATED: u8 = 2;
+    /// Points in space that carry rigid parts.
+    pub const NATURAL: u8 = 3;
+    /// Nodes of a mesh.
+    pub const FINITE_ELEMENTS: u8 = 4;
+    /// Nodes of a lattice.
+    pub const LATTICE: u8 = 5;
+    /// A game's own.
+    pub const OWN: u8 = 255;
+}

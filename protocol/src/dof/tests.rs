@@ -1,0 +1,301 @@
+//! Streams over links that lose, delay, repeat and reorder, and against senders who mean harm.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::WireError;
+
+const RIGID: [Group; 2] = [Group::Point, Group::Rotation];
+
+/// A small deterministic generator: xorshift.
+struct Dice(u64);
+
+impl Dice {
+    fn roll(&mut self, sides: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0 % sides
+    }
+
+    /// −1 to 1.
+    fn spread(&mut self) -> f64 {
+        self.roll(2001) as f64 / 1000.0 - 1.0
+    }
+}
+
+/// Bodies that fly, spin, bounce and rest; every third is attached to the one before.
+struct Toys {
+    dice: Dice,
+    bodies: Vec<Toy>,
+    next_id: u32,
+}
+
+struct Toy {
+    id: u32,
+    parent: Option<u32>,
+    q: [f64; 7],
+    velocity: [f64; 3],
+    spin: f64,
+}
+
+impl Toys {
+    fn new(seed: u64, count: usize) -> Self {
+        let mut toys = Self { dice: Dice(seed | 1), bodies: Vec::new(), next_id: 0 };
+        (0..count).for_each(|_| toys.add());
+        toys
+    }
+
+    fn add(&mut self) {
+        let d = &mut self.dice;
+        let velocity = [d.spread() * 10.0, d.spread() * 3.0, d.spread() * 10.0];
+        let q = [d.spread() * 50.0, d.spread() * 50.0, d.spread() * 50.0, 0.0, 0.0, 0.0, 1.0];
+        let parent = self.bodies.last().filter(|_| self.next_id % 3 == 2).map(|toy| toy.id);
+        self.bodies.push(Toy { id: self.next_id, parent, q, velocity, spin: d.spread() * 0.3 });
+        self.next_id += 1 + d.roll(3) as u32;
+    }
+
+    fn step(&mut self) {
+        let d = &mut self.dice;
+        for toy in &mut self.bodies {
+            if d.roll(20) == 0 {
+                toy.velocity = if d.roll(3) == 0 { [0.0; 3] } else { [d.spread() * 10.0, 0.0, d.spread() * 10.0] };
+                toy.spin = if toy.velocity == [0.0; 3] { 0.0 } else { d.spread() * 0.3 };
+            }
+            (0..3).for_each(|i| toy.q[i] += toy.velocity[i] / 30.0);
+            let (s, c) = (0.5 * toy.spin).sin_cos();
+            let [x, y, z, w] = [toy.q[3], toy.q[4], toy.q[5], toy.q[6]];
+            // About the body's y.
+            [toy.q[3], toy.q[4], toy.q[5], toy.q[6]] = [x * c - z * s, y * c + w * s, z * c + x * s, w * c - y * s];
+        }
+    }
+
+    fn state(&self) -> State {
+        let mut state = State::new(Precision::default()).unwrap();
+        for toy in &self.bodies {
+            let parent = toy.parent.filter(|&id| state.find(id).is_some());
+            state.push(toy.id, 1, parent, &RIGID, &toy.q).unwrap();
+        }
+        state
+    }
+}
+
+/// What a receiver knows of each body, as an encoder would have quantised it.
+fn known(frame: &Frame) -> Vec<(u32, Vec<Quantised>)> {
+    frame.bodies().map(|(body, _)| (body.id, frame.groups(body).iter().map(|g| g.value).collect())).collect()
+}
+
+fn told(state: &State) -> Vec<(u32, Vec<Quantised>)> {
+    state.bodies().iter().map(|body| (body.id, state.groups(body).to_vec())).collect()
+}
+
+/// Runs a stream for `ticks` over a link of up to `delay_max` ticks each way that loses `lost` of 100 and repeats some.
+/// Every decoded snapshot must be the sender's state of that tick. Answers bytes a snapshot and decoded snapshots.
+fn run(seed: u64, ticks: u64, delay_max: u64, lost: u64, churn: bool) -> (usize, usize) {
+    let mut toys = Toys::new(seed, 40);
+    let mut dice = Dice(seed.wrapping_mul(77) | 1);
+    let (mut encoder, mut decoder) = (Encoder::default(), Decoder::default());
+    let (mut there, mut back) = (Vec::new(), Vec::new());
+    let (mut bytes, mut decoded) = (0, 0);
+    let mut states = Vec::new();
+    for tick in 1..=ticks {
+        toys.step();
+        if churn && dice.roll(5) == 0 {
+            toys.add();
+            let gone = dice.roll(toys.bodies.len() as u64) as usize;
+            toys.bodies.remove(gone);
+        }
+        let state = toys.state();
+        for (_, (newest, before)) in back.extract_if(.., |(due, _)| *due <= tick) {
+            encoder.acknowledge(newest, before);
+        }
+        let snapshot = encoder.encode(tick, &state, &[]);
+        bytes += snapshot.len();
+        states.push(told(&state));
+        for _ in 0..1 + u64::from(dice.roll(10) == 0) {
+            if dice.roll(100) >= lost {
+                there.push((tick + dice.roll(delay_max + 1), tick, snapshot.clone()));
+            }
+        }
+        for (_, of, snapshot) in there.extract_if(.., |(due, ..)| *due <= tick) {
+            match decoder.decode(of, &snapshot) {
+                Ok(frame) => {
+                    assert_eq!(known(frame), states[of as usize - 1], "tick {of}");
+                    decoded += 1;
+                }
+                // Late: what it needs is forgotten.
+                Err(error) => assert!(error == WireError::NoBaseline && of + 40 < tick, "tick {of} at {tick}: {error}"),
+            }
+        }
+        if let Some(ack) = decoder.acknowledgement().filter(|_| dice.roll(100) >= lost) {
+            back.push((tick + 1 + dice.roll(delay_max + 1), ack));
+        }
+    }
+    (bytes / ticks as usize, decoded)
+}
+
+#[test]
+fn a_stream_survives_loss_delay_repetition_and_reordering() {
+    let (clean, decoded) = run(1, 300, 0, 0, false);
+    assert!(decoded >= 300);
+    let (lossy, decoded) = run(1, 300, 5, 20, false);
+    assert!(decoded > 200, "{decoded}");
+    assert!(clean < 250 && lossy < 4 * clean, "{clean} and {lossy} bytes");
+    run(2, 300, 3, 50, true);
+    run(3, 300, 8, 80, true);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn any_link_will_do(seed: u64, delay in 0u64..12, lost in 0u64..90, churn: bool) {
+        run(seed, 60, delay, lost, churn);
+    }
+}
+
+#[test]
+fn bodies_that_are_left_out_keep_their_older_state_until_they_are_sent() {
+    let mut toys = Toys::new(5, 30);
+    let (mut encoder, mut decoder) = (Encoder::default(), Decoder::default());
+    let mut dice = Dice(99);
+    for tick in 1..200 {
+        toys.step();
+        let state = toys.state();
+        let chosen: Vec<_> = state.bodies().iter().map(|_| dice.roll(3) == 0).collect();
+        let whole = tick > 190;
+        let snapshot = encoder.encode(tick, &state, if whole { &[] } else { &chosen });
+        let frame = decoder.decode(tick, &snapshot).unwrap();
+        let known = known(frame);
+        for (body, groups) in told(&state).into_iter().zip(&chosen).filter(|(_, sent)| whole || **sent).map(|(b, _)| b)
+        {
+            assert!(known.contains(&(body, groups)), "tick {tick}");
+        }
+        if dice.roll(4) > 0 {
+            encoder.acknowledge(tick, u32::MAX);
+        }
+        if whole {
+            assert_eq!(known, told(&state));
+        }
+    }
+}
+
+#[test]
+fn what_rests_costs_next_to_nothing() {
+    let toys = Toys::new(8, 1000);
+    let state = toys.state();
+    let (mut encoder, mut decoder) = (Encoder::default(), Decoder::default());
+    let sizes: Vec<_> = (1..60)
+        .map(|tick| {
+            let snapshot = encoder.encode(tick, &state, &[]);
+            decoder.decode(tick, &snapshot).unwrap();
+            encoder.acknowledge(tick, 0);
+            snapshot.len()
+        })
+        .collect();
+    assert!(sizes[0] > 5000 && *sizes.last().unwrap() < 16, "{sizes:?}");
+}
+
+#[test]
+fn a_decoder_without_the_baseline_says_so_and_a_restart_heals_it() {
+    let mut toys = Toys::new(11, 10);
+    let mut encoder = Encoder::default();
+    let mut decoder = Decoder::default();
+    for tick in 1..10 {
+        toys.step();
+        encoder.encode(tick, &toys.state(), &[]);
+        encoder.acknowledge(tick, 0);
+    }
+    let snapshot = encoder.encode(10, &toys.state(), &[]);
+    assert_eq!(decoder.decode(10, &snapshot).unwrap_err(), WireError::NoBaseline);
+    encoder.restart();
+    let snapshot = encoder.encode(11, &toys.state(), &[]);
+    assert_eq!(known(decoder.decode(11, &snapshot).unwrap()), told(&toys.state()));
+}
+
+/// A decoder with a past, a snapshot that it can decode next, and its tick.
+fn midstream(seed: u64) -> (Decoder, Vec<u8>, u64) {
+    let mut toys = Toys::new(seed, 25);
+    let (mut encoder, mut decoder) = (Encoder::default(), Decoder::default());
+    for tick in 1..20 {
+        toys.step();
+        let snapshot = encoder.encode(tick, &toys.state(), &[]);
+        decoder.decode(tick, &snapshot).unwrap();
+        encoder.acknowledge(tick, u32::MAX);
+    }
+    toys.step();
+    toys.add();
+    (decoder, encoder.encode(20, &toys.state(), &[]), 20)
+}
+
+#[test]
+fn flipped_bits_are_noticed_and_change_nothing() {
+    let (mut decoder, snapshot, tick) = midstream(3);
+    let before = decoder.newest().cloned();
+    let mut passed = 0;
+    for bit in 0..snapshot.len() * 8 {
+        let mut flipped = snapshot.clone();
+        flipped[bit / 8] ^= 1 << (bit % 8);
+        passed += u32::from(decoder.decode(tick, &flipped).is_ok());
+    }
+    // The check has 16 bits; bits at the very end may mean nothing.
+    assert!(passed < 8, "{passed} of {}", snapshot.len() * 8);
+    if passed == 0 {
+        assert_eq!(decoder.newest().cloned(), before);
+    }
+    assert!(decoder.decode(tick, &snapshot).is_ok());
+}
+
+#[test]
+fn hostile_bytes_are_errors_and_no_more() {
+    let (mut decoder, snapshot, tick) = midstream(4);
+    for length in 0..snapshot.len().saturating_sub(2) {
+        assert!(decoder.decode(tick, &snapshot[..length]).is_err(), "length {length}");
+    }
+    let mut dice = Dice(1234);
+    let mut bytes = Vec::new();
+    for round in 0..100_000 {
+        bytes.clear();
+        if round % 2 == 0 {
+            bytes.extend((0..dice.roll(120)).map(|_| dice.roll(256) as u8));
+            if let Some(flags) = bytes.first_mut() {
+                *flags &= 7;
+            }
+        } else {
+            bytes.extend_from_slice(&snapshot);
+            for _ in 0..1 + dice.roll(5) {
+                let at = dice.roll(bytes.len() as u64) as usize;
+                bytes[at] = dice.roll(256) as u8;
+            }
+        }
+        let of = if round % 3 == 0 { dice.roll(u64::MAX) } else { tick };
+        // Sixteen bits of check let one in 65536 pass.
+        let _ = decoder.decode(of, &bytes);
+    }
+}
+
+#[test]
+fn quantisation_keeps_its_bounds() {
+    let mut dice = Dice(7);
+    let precision = Precision { point: 1000, rotation: 1500, scalar: 1000, rate: 200 };
+    for _ in 0..10_000 {
+        let raw = [0; 4].map(|_: i32| dice.spread());
+        let length = raw.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if length < 0.1 {
+            continue;
+        }
+        let unit = raw.map(|x| x / length);
+        let mut back = Vec::new();
+        Quantised::of(Group::Rotation, &unit, &precision).numbers(&precision, &mut back);
+        let dot: f64 = unit.iter().zip(&back).map(|(a, b)| a * b).sum();
+        let angle = 2.0 * dot.abs().min(1.0).acos().to_degrees();
+        assert!(angle < 0.14, "{angle} degrees");
+        let point = [dice.spread() * 5000.0, dice.spread(), 0.0];
+        back.clear();
+        Quantised::of(Group::Point, &point, &precision).numbers(&precision, &mut back);
+        assert!(point.iter().zip(&back).all(|(a, b)| (a - b).abs() <= 0.000_501));
+    }
+    for wild in [f64::NAN, f64::INFINITY, -1e300] {
+        let Quantised { steps, .. } = Quantised::of(Group::Rotation, &[wild; 4], &precision);
+        assert!(steps.iter().all(|s| s.abs() <= 1500));
+    }
+}

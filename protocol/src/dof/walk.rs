@@ -1,0 +1,274 @@
+//! One snapshot's coded part: the walk over all bodies that both sides make alike.
+
+use super::frame::{BODIES_MAX, BODY_GROUPS_MAX, Body, Frame, GROUPS_MAX, State};
+use super::predict::GroupState;
+use super::quantise::{Group, Precision, Quantised};
+use super::range_coder::Coder;
+use super::residual::{Models, Surroundings};
+use crate::{WireError, codec::require};
+
+/// Uses of whole numbers.
+mod number {
+    pub const REMOVED: usize = 0;
+    pub const ADDED: usize = 1;
+    pub const GAP: usize = 2;
+    pub const PARENT: usize = 3;
+    /// And the following: first values by group.
+    pub const FIRST: usize = 4;
+}
+
+/// Uses of flags.
+mod flag {
+    pub const CHANGED: usize = 0;
+    pub const ATTACHED: usize = 1;
+    pub const SAME_LAYOUT: usize = 2;
+    pub const SENT: usize = 3;
+}
+
+/// What an encoder has to say.
+#[derive(Clone, Copy)]
+pub struct Source<'a> {
+    /// All bodies that the stream is to have.
+    pub state: &'a State,
+    /// Of each body of the state, whether this snapshot carries it; empty for all.
+    pub chosen: &'a [bool],
+}
+
+impl Source<'_> {
+    fn carries(&self, index: usize) -> bool {
+        self.chosen.is_empty() || self.chosen[index]
+    }
+}
+
+/// The parts of a walk that do not change.
+pub struct Walk<'a, C> {
+    /// Reads or writes.
+    pub coder: &'a mut C,
+    /// What the snapshot is coded against.
+    pub base: &'a Frame,
+    /// An older one that the receiver has too, for velocities.
+    pub earlier: Option<&'a Frame>,
+    /// Whether bodies may be left out.
+    pub partial: bool,
+    /// What is coded; `None` when decoding.
+    pub source: Option<Source<'a>>,
+}
+
+impl<C: Coder> Walk<'_, C> {
+    /// Codes the snapshot of `tick` into `next`, a copy of the base without bodies.
+    ///
+    /// # Errors
+    /// [`WireError`] for data that no encoder writes.
+    pub fn run(mut self, next: &mut Frame) -> Result<(), WireError> {
+        let changed = self.source.is_some_and(|source| is_changed(self.base, &source));
+        let (mut removed, mut added) = (Vec::new(), Vec::new());
+        if next.models.flag(self.coder, flag::CHANGED, changed) {
+            removed = self.removals(&mut next.models)?;
+            added = self.additions(&mut next.models)?;
+        }
+        let (mut removed, mut added) = (removed.into_iter().peekable(), added.into_iter().peekable());
+        let mut neighbour = 0;
+        for index in 0..self.base.bodies.len() {
+            if removed.next_if_eq(&index).is_some() {
+                continue;
+            }
+            let id = self.base.bodies[index].id;
+            while let Some(body) = added.next_if(|body| body.id < id) {
+                self.first(next, body)?;
+            }
+            require(added.peek().is_none_or(|body| body.id != id), "added body", "not there yet")?;
+            self.body(next, index, &mut neighbour)?;
+        }
+        added.try_for_each(|body| self.first(next, body))
+    }
+
+    /// Indices in the base of those that are gone.
+    fn removals(&mut self, models: &mut Models) -> Result<Vec<usize>, WireError> {
+        let gone: Vec<_> = match self.source {
+            Some(Source { state, .. }) => {
+                (0..self.base.bodies.len()).filter(|&i| !is_in(&self.base.bodies[i], state)).collect()
+            }
+            None => Vec::new(),
+        };
+        let count = models.number(self.coder, number::REMOVED, gone.len() as u32) as usize;
+        require(count <= self.base.bodies.len(), "removed bodies", "at most those that are there")?;
+        let mut removed = Vec::with_capacity(count);
+        let mut after = 0;
+        for k in 0..count {
+            let gap = gone.get(k).map_or(0, |&index| index - after);
+            after += models.number(self.coder, number::GAP, gap as u32) as usize;
+            require(after < self.base.bodies.len(), "removed body", "one that is there")?;
+            removed.push(after);
+            after += 1;
+        }
+        Ok(removed)
+    }
+
+    /// Those that are new, without groups' values.
+    fn additions(&mut self, models: &mut Models) -> Result<Vec<Added>, WireError> {
+        let new: Vec<_> = self.source.map(|source| fresh(self.base, &source).collect()).unwrap_or_default();
+        let count = models.number(self.coder, number::ADDED, new.len() as u32) as usize;
+        require(self.base.bodies.len() + count <= BODIES_MAX, "bodies", "at most 16384")?;
+        let mut added: Vec<Added> = Vec::new();
+        let mut after = 0u32;
+        for k in 0..count {
+            let (body, layout) = new.get(k).map_or((None, Vec::new()), |&body| {
+                let groups = self.source.map(|s| s.state.groups(body)).unwrap_or_default();
+                (Some(body), groups.iter().map(|g| g.group).collect())
+            });
+            let gap = body.map_or(0, |body| body.id - after);
+            let id = after.checked_add(models.number(self.coder, number::GAP, gap)).ok_or(WireError::Malformed)?;
+            after = id.checked_add(1).ok_or(WireError::Malformed)?;
+            let same = added
+                .last()
+                .is_some_and(|last| body.is_some_and(|body| last.kind == body.kind && last.layout == layout));
+            let parent = self.parent(models, id, body)?;
+            let same = models.flag(self.coder, flag::SAME_LAYOUT, same);
+            let (kind, layout) = match added.last() {
+                Some(last) if same => (last.kind, last.layout.clone()),
+                None if same => return Err(WireError::Malformed),
+                _ => self.layout(body.map_or(0, |body| body.kind), &layout)?,
+            };
+            require(!self.coder.is_exhausted(), "coded data", "longer")?;
+            added.push(Added { id, kind, parent, layout });
+        }
+        Ok(added)
+    }
+
+    fn parent(&mut self, models: &mut Models, id: u32, body: Option<&Body>) -> Result<Option<u32>, WireError> {
+        let parent = body.and_then(|body| body.parent);
+        if !models.flag(self.coder, flag::ATTACHED, parent.is_some()) {
+            return Ok(None);
+        }
+        let back = parent.map_or(0, |parent| id - parent - 1);
+        let back = models.number(self.coder, number::PARENT, back);
+        Ok(Some(id.checked_sub(back).and_then(|id| id.checked_sub(1)).ok_or(WireError::Malformed)?))
+    }
+
+    fn layout(&mut self, kind: u8, groups: &[Group]) -> Result<(u8, Vec<Group>), WireError> {
+        let kind = self.coder.raw(kind.into(), 8) as u8;
+        let count = self.coder.raw(groups.len() as u32, 8) as usize;
+        require((1..=BODY_GROUPS_MAX).contains(&count), "groups of a body", "1 to 255")?;
+        let code = |i: usize| groups.get(i).map_or(0, |&group| group as u32);
+        Ok((kind, (0..count).map(|i| Group::ALL[self.coder.raw(code(i), 2) as usize]).collect()))
+    }
+
+    /// A body that the receiver does not have yet.
+    fn first(&mut self, next: &mut Frame, added: Added) -> Result<(), WireError> {
+        require(next.groups.len() + added.layout.len() <= GROUPS_MAX, "groups", "at most 65536")?;
+        require(!self.coder.is_exhausted(), "coded data", "longer")?;
+        let source = self.source.and_then(|s| Some(s.state.groups(s.state.find(added.id)?)));
+        let start = next.groups.len();
+        // Points are likely to be near the first point of the body before.
+        let before = next.bodies.last().map(|body| next.groups[body.start as usize].value);
+        for (i, &group) in added.layout.iter().enumerate() {
+            let value = source.map(|groups| groups[i]);
+            let near = if group == Group::Point { before } else { None };
+            let near = near.filter(|near| near.group == Group::Point).map_or([0; 3], |near| near.steps);
+            let value = first_value(self.coder, &mut next.models, group, near, value, &next.precision)?;
+            next.groups.push(GroupState::first(value));
+        }
+        let groups = added.layout.len() as u8;
+        next.bodies.push(Body { id: added.id, kind: added.kind, parent: added.parent, start: start as u32, groups });
+        next.ticks.push(next.tick);
+        Ok(())
+    }
+
+    /// A body of the base.
+    fn body(&mut self, next: &mut Frame, index: usize, neighbour: &mut u32) -> Result<(), WireError> {
+        let body = self.base.bodies[index];
+        let old = &self.base.groups[body.start as usize..][..body.groups.into()];
+        let source = self.source.and_then(|s| {
+            let at = s.state.bodies().binary_search_by_key(&body.id, |body| body.id).ok()?;
+            Some((s.carries(at), s.state.groups(&s.state.bodies()[at])))
+        });
+        let sent = !self.partial || next.models.flag(self.coder, flag::SENT, source.is_some_and(|(sent, _)| sent));
+        let start = next.groups.len() as u32;
+        next.bodies.push(Body { start, ..body });
+        if !sent {
+            next.ticks.push(self.base.ticks[index]);
+            next.groups.extend_from_slice(old);
+            return Ok(());
+        }
+        require(!self.coder.is_exhausted(), "coded data", "longer")?;
+        let tick = self.base.ticks[index];
+        let ahead = next.tick.saturating_sub(tick) as i64;
+        let earlier = self.earlier.and_then(|earlier| earlier_of(earlier, index, &body, tick));
+        let mut around = Surroundings { sibling: None, neighbour: *neighbour };
+        let mut moved = 0;
+        for (i, base) in old.iter().enumerate() {
+            let before = earlier.map(|(groups, span)| (&groups[i].value, span));
+            let prediction = base.predict(ahead, before, &next.precision);
+            let value = source.map(|(_, groups)| &groups[i]);
+            let (value, size) = next.models.group(self.coder, base, &prediction, &around, value, &next.precision)?;
+            next.groups.push(prediction.update(base, value, &next.precision));
+            around.sibling = Some(size);
+            moved += size;
+        }
+        next.ticks.push(next.tick);
+        *neighbour = moved;
+        Ok(())
+    }
+}
+
+/// A body that is new.
+struct Added {
+    id: u32,
+    kind: u8,
+    parent: Option<u32>,
+    layout: Vec<Group>,
+}
+
+/// Bodies of the source that the receiver does not have and gets.
+fn fresh<'a>(base: &'a Frame, source: &Source<'a>) -> impl Iterator<Item = &'a Body> {
+    let source = *source;
+    let bodies = source.state.bodies().iter().enumerate();
+    let is_new = |body: &Body| base.find(body.id).is_none_or(|old| !is_in(old, source.state));
+    bodies.filter(move |(index, body)| source.carries(*index) && is_new(body)).map(|(_, body)| body)
+}
+
+/// Whether a body that the receiver has is in `state`; one of another shape under the same id is not the same.
+fn is_in(body: &Body, state: &State) -> bool {
+    let shape = |body: &Body| (body.kind, body.parent, body.groups);
+    state.find(body.id).is_some_and(|now| shape(now) == shape(body))
+}
+
+fn is_changed(base: &Frame, source: &Source) -> bool {
+    let shape = |body: &Body| (body.id, body.kind, body.parent, body.groups);
+    if base.bodies.iter().map(shape).eq(source.state.bodies().iter().map(shape)) {
+        return false;
+    }
+    base.bodies.iter().any(|body| !is_in(body, source.state)) || fresh(base, source).next().is_some()
+}
+
+/// The groups of `body` in `earlier`, where they are older than `tick`, and by how many ticks.
+fn earlier_of<'a>(earlier: &'a Frame, hint: usize, body: &Body, tick: u64) -> Option<(&'a [GroupState], i64)> {
+    let at = match earlier.bodies.get(hint) {
+        Some(same) if same.id == body.id => hint,
+        _ => earlier.bodies.binary_search_by_key(&body.id, |body| body.id).ok()?,
+    };
+    let (found, then) = (earlier.bodies[at], earlier.ticks[at]);
+    let span = tick.checked_sub(then).filter(|&span| span > 0)?;
+    (found.groups == body.groups).then(|| (earlier.groups(&earlier.bodies[at]), span as i64))
+}
+
+fn first_value(
+    coder: &mut impl Coder,
+    models: &mut Models,
+    group: Group,
+    near: [i32; 3],
+    value: Option<Quantised>,
+    precision: &Precision,
+) -> Result<Quantised, WireError> {
+    let value = value.unwrap_or(Quantised { group, largest: 0, steps: near });
+    let mut read = Quantised { group, largest: 0, steps: [0; 3] };
+    if group == Group::Rotation {
+        read.largest = coder.raw(value.largest.into(), 2) as u8;
+    }
+    for (i, near) in near.into_iter().enumerate().take(group.components()) {
+        let step = models.signed(coder, number::FIRST + group as usize, value.steps[i] - near);
+        read.steps[i] = near.saturating_add(step);
+    }
+    read.check(precision)?;
+    Ok(read)
+}
