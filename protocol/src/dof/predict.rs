@@ -48,7 +48,9 @@ pub struct GroupState {
 /// What is expected of a group.
 #[derive(Clone, Copy, Debug)]
 pub struct Prediction {
-    guesses: [Guess; GUESSES],
+    /// `None` where all guesses are that it stays.
+    guesses: Option<[Guess; GUESSES]>,
+    base: Quantised,
     best: usize,
     /// Ticks from the baseline.
     ahead: i64,
@@ -98,11 +100,13 @@ impl GroupState {
     pub fn predict(&self, ahead: i64, earlier: Option<(&Quantised, i64)>, precision: &Precision) -> Prediction {
         let ahead = ahead.clamp(0, AHEAD_MAX);
         let earlier = earlier.filter(|(earlier, _)| earlier.group == self.value.group);
+        let is_still = self.rate == [0; 3] && self.offset == [0; 3];
         let guesses = match self.value.group {
-            Group::Rotation => self.rotations(ahead, earlier, precision).map(Guess::Rotation),
-            _ => self.lines(ahead, earlier).map(Guess::Linear),
+            _ if is_still && earlier.is_none_or(|(earlier, _)| *earlier == self.value) => None,
+            Group::Rotation => Some(self.rotations(ahead, earlier, precision).map(Guess::Rotation)),
+            _ => Some(self.lines(ahead, earlier).map(Guess::Linear)),
         };
-        Prediction { guesses, best: self.best(), ahead }
+        Prediction { guesses, base: self.value, best: self.best(), ahead }
     }
 
     fn lines(&self, ahead: i64, earlier: Option<(&Quantised, i64)>) -> [[i64; 3]; GUESSES] {
@@ -147,13 +151,27 @@ impl GroupState {
 
 impl Prediction {
     /// The state that is expected; `largest` is the component that a rotation leaves out, where that is known.
-    pub fn expected(&self, largest: Option<u8>, group: Group, precision: &Precision) -> Quantised {
-        self.guesses[self.best].rounded(largest, group, precision)
+    pub fn expected(&self, largest: Option<u8>, precision: &Precision) -> Quantised {
+        match &self.guesses {
+            Some(guesses) => guesses[self.best].rounded(largest, self.base.group, precision),
+            None => self.stay(largest, precision),
+        }
     }
 
-    /// How far track and last move are apart in one component: what is uncertain. Steps.
+    fn stay(&self, largest: Option<u8>, precision: &Precision) -> Quantised {
+        match largest {
+            Some(largest) if largest != self.base.largest => {
+                let rest = Guess::Rotation(Quaternion(self.base.components(precision)));
+                rest.rounded(Some(largest), self.base.group, precision)
+            }
+            _ => self.base,
+        }
+    }
+
+    /// How far track and last move are apart by component: what is uncertain. Steps.
     pub fn spread(&self) -> [u32; 3] {
-        match (self.guesses[TRACK], self.guesses[LAST_MOVE]) {
+        let Some(guesses) = &self.guesses else { return [0; 3] };
+        match (guesses[TRACK], guesses[LAST_MOVE]) {
             (Guess::Linear(a), Guess::Linear(b)) => {
                 [0, 1, 2].map(|i| ((a[i] - b[i]).unsigned_abs() >> FRACTION) as u32)
             }
@@ -166,21 +184,28 @@ impl Prediction {
     }
 
     /// Which way the group moves, by component: −1, 0 or 1.
-    pub fn direction(&self, expected: &Quantised, base: &Quantised) -> [i32; 3] {
-        if expected.largest != base.largest {
+    pub fn direction(&self, expected: &Quantised) -> [i32; 3] {
+        if expected.largest != self.base.largest {
             return [0; 3];
         }
-        [0, 1, 2].map(|i| (expected.steps[i] - base.steps[i]).signum())
+        [0, 1, 2].map(|i| (expected.steps[i] - self.base.steps[i]).signum())
     }
 
     /// The state after `base`, now that the value is known.
     pub fn update(&self, base: &GroupState, value: Quantised, precision: &Precision) -> GroupState {
         let mut next = GroupState { value, ..*base };
-        for (error, guess) in next.errors.iter_mut().zip(&self.guesses) {
-            let guess = guess.rounded(Some(value.largest), value.group, precision);
-            let wrong: u32 = (0..3).map(|i| value.steps[i].abs_diff(guess.steps[i])).sum();
+        let rounded = |guess: usize| match &self.guesses {
+            Some(guesses) => guesses[guess].rounded(Some(value.largest), value.group, precision),
+            None => self.stay(Some(value.largest), precision),
+        };
+        for (guess, error) in next.errors.iter_mut().enumerate() {
+            let wrong: u32 = value.steps.iter().zip(rounded(guess).steps).map(|(a, b)| a.abs_diff(b)).sum();
             // A step counts 16, and a quarter of the old error goes each time.
             *error = ((u32::from(*error) * 3 + wrong.min(1000) * 16) / 4) as u16;
+        }
+        if self.guesses.is_none() && value == self.base {
+            next.fitted = (next.fitted + 1).min(FITTED_MAX);
+            return next;
         }
         let (miss, step) = self.miss(&value, precision);
         next.follow(miss, step, self.ahead);
@@ -189,7 +214,12 @@ impl Prediction {
 
     /// By how much the track missed `value`, and what a step is, both in fractions.
     fn miss(&self, value: &Quantised, precision: &Precision) -> ([i64; 3], i64) {
-        match self.guesses[TRACK] {
+        let track = match &self.guesses {
+            Some(guesses) => guesses[TRACK],
+            None if value.group == Group::Rotation => Guess::Rotation(Quaternion(self.base.components(precision))),
+            None => Guess::Linear(self.base.steps.map(|s| i64::from(s) << FRACTION)),
+        };
+        match track {
             Guess::Linear(track) => {
                 ([0, 1, 2].map(|i| (i64::from(value.steps[i]) << FRACTION) - track[i]), 1 << FRACTION)
             }

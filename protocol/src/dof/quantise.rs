@@ -136,8 +136,9 @@ impl Quantised {
     pub(super) fn components(&self, precision: &Precision) -> [i64; 4] {
         let mut all = [0; 4];
         let mut rest = ONE * ONE;
+        let step = ONE / i64::from(precision.rotation);
         for (i, steps) in others(self.largest.into()).into_iter().zip(self.steps) {
-            all[i] = i64::from(steps) * ONE / i64::from(precision.rotation);
+            all[i] = i64::from(steps) * step;
             rest -= all[i] * all[i];
         }
         all[usize::from(self.largest)] = isqrt(rest);

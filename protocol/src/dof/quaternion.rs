@@ -28,22 +28,30 @@ impl Quaternion {
         ])
     }
 
+    /// The rotation twice.
+    fn squared(self) -> Self {
+        let [x, y, z, w] = self.0;
+        let [tx, ty, tz] = [x, y, z].map(|c| (2 * w * c) >> BITS);
+        Self([tx, ty, tz, (w * w - x * x - y * y - z * z) >> BITS])
+    }
+
     /// The rotation by the rotation vector `v`, rad of 2^24, each component at most 2^31 in size.
     pub fn exp(v: [i64; 3]) -> Self {
         // Half the angle, of 2^30: the vector part's direction.
         let mut h = v.map(|x| x << 5);
         let mut squarings = 0;
-        // Below an eighth of a radian these terms suffice; it is at most 2^36, which takes ten halvings.
-        while h.iter().any(|x| x.abs() > ONE >> 4) {
+        // Below a quarter of a radian these terms suffice; it is at most 2^36, which takes eight halvings.
+        while h.iter().any(|x| x.abs() > ONE >> 2) {
             h = h.map(|x| x >> 1);
             squarings += 1;
         }
         let square = h.iter().map(|x| x * x).sum::<i64>() >> BITS;
         let fourth = (square * square) >> BITS;
-        let sine = ONE - square / 6 + fourth / 120;
-        let cosine = ONE - square / 2 + fourth / 24;
+        let sixth = (fourth * square) >> BITS;
+        let sine = ONE - square / 6 + fourth / 120 - sixth / 5040;
+        let cosine = ONE - square / 2 + fourth / 24 - sixth / 720;
         let [x, y, z] = h.map(|x| (x * sine) >> BITS);
-        (0..squarings).fold(Self([x, y, z, cosine]), |q, _| q.times(q))
+        (0..squarings).fold(Self([x, y, z, cosine]), |q, _| q.squared())
     }
 
     /// The rotation vector, rad of 2^24, of at most half a turn.

@@ -97,7 +97,7 @@ impl Models {
     ) -> Result<(Quantised, u32), WireError> {
         let kind = base.value.group;
         let g = kind as usize;
-        let mut expected = prediction.expected(None, kind, precision);
+        let mut expected = prediction.expected(None, precision);
         let spread = prediction.spread();
         let error = error_bucket(base.expected_error());
         let widest = spread_bucket(spread.into_iter().max().unwrap_or(0));
@@ -118,9 +118,9 @@ impl Models {
 
         if kind == Group::Rotation {
             let largest = self.largest(coder, &expected, value, precision);
-            expected = prediction.expected(Some(largest), kind, precision);
+            expected = prediction.expected(Some(largest), precision);
         }
-        let direction = prediction.direction(&expected, &base.value);
+        let direction = prediction.direction(&expected);
         let mut steps = [0; 3];
         let mut seen = 0;
         let count = kind.components();
