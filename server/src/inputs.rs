@@ -102,9 +102,13 @@ fn count(counters: &Counters, refused: &Refused) {
         Refused::Wire(WireError::Content { .. }) => &counters.input_content,
         Refused::Wire(WireError::Forged) => &counters.input_forged,
         Refused::Session(InputRefusal::NoSession) => &counters.input_no_session,
-        Refused::Wire(WireError::Malformed | WireError::Kind { .. } | WireError::ArenaName) => {
-            &counters.input_malformed
-        }
+        Refused::Wire(
+            WireError::Malformed
+            | WireError::Kind { .. }
+            | WireError::ArenaName
+            | WireError::NoBaseline
+            | WireError::Desync,
+        ) => &counters.input_malformed,
         Refused::Session(InputRefusal::Stale) => &counters.input_stale,
         Refused::Session(InputRefusal::Flood) => &counters.input_flood,
     };

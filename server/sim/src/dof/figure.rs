@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::interface::{BLOCK_RATES_MAX, Dof, Inertia, LocalState, PartPoint};
 use super::Motion;
+use super::interface::{BLOCK_RATES_MAX, Dof, Inertia, LocalState, PartPoint};
 use crate::collide::Collider;
 use crate::elimination::minimum_degree;
 use crate::error::{LARGEST, SimError, require, require_vector};
