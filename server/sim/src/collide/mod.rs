@@ -26,6 +26,7 @@ pub use shape::{Collider, HULL_POINTS_MAX, Shape};
 
 use crate::dof::{BodyId, Placed, Pose, Twist};
 use crate::error::{SimError, require_rotation, require_vector};
+use crate::potential::restitution::Blow;
 use crate::settings::Settings;
 use collision::{Closest, Touch};
 pub(crate) use hull::Bodies;
@@ -110,6 +111,8 @@ pub(crate) struct ContactPoint {
     pub anchor: DVec3,
     /// At the end of the last tick that had this point, N.
     pub normal_force: f64,
+    /// That the two gave each other in the last tick.
+    pub blow: Blow,
     /// Logic lets the pair pass in this tick.
     pub is_cancelled: bool,
     feature: u32,
@@ -126,8 +129,8 @@ impl ContactPoint {
     pub fn at(position: DVec3, normal: DVec3, gap: f64, friction: f64) -> Self {
         let (a, b, feature, is_cancelled) = (0, Partner::Static(0), 0, false);
         let surface = Material::from(friction).surface;
-        let (anchor, normal_force) = (DVec3::ZERO, 0.0);
-        Self { a, b, position, normal, gap, surface, anchor, normal_force, is_cancelled, feature }
+        let (anchor, normal_force, blow) = (DVec3::ZERO, 0.0, Blow::default());
+        Self { a, b, position, normal, gap, surface, anchor, normal_force, blow, is_cancelled, feature }
     }
 }
 
@@ -216,7 +219,8 @@ impl Detector {
         let of_pair = |contact: &ContactPoint| (contact.a, contact.b);
         let start = self.contacts.partition_point(|contact| of_pair(contact) < touch.key);
         for contact in self.contacts[start..].iter_mut().take_while(|contact| of_pair(contact) == touch.key) {
-            (contact.is_cancelled, contact.anchor, contact.normal_force) = (true, DVec3::ZERO, 0.0);
+            let (anchor, normal_force, blow) = (DVec3::ZERO, 0.0, Blow::default());
+            *contact = ContactPoint { is_cancelled: true, anchor, normal_force, blow, ..*contact };
         }
         true
     }

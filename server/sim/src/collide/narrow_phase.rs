@@ -15,6 +15,7 @@ use super::manifold::{Manifold, ManifoldPoint, POINTS_MAX};
 use super::shape::{Collider, Shape};
 use super::{ContactPoint, Moving, Partner, Surface};
 use crate::dof::Pose;
+use crate::potential::restitution::Blow;
 use crate::settings::Settings;
 
 /// A point without a name of its own is found again where it lies within this of its place last tick, m.
@@ -247,14 +248,25 @@ impl NarrowPhase {
                 let near = (o.position - point.position).length() < SAME_POINT;
                 single || named || (near && (o.feature == NAMELESS || point.feature == NAMELESS))
             });
-            let (anchor, normal_force) = known.map_or((DVec3::ZERO, 0.0), |i| {
+            let (anchor, normal_force, blow) = known.map_or((DVec3::ZERO, 0.0, Blow::default()), |i| {
                 let memory = old.swap_remove(i);
-                (memory.anchor - normal * normal.dot(memory.anchor), memory.normal_force)
+                (memory.anchor - normal * normal.dot(memory.anchor), memory.normal_force, memory.blow)
             });
             let ManifoldPoint { position, gap, feature } = *point;
             let (surface, is_cancelled) = (meeting.surface, false);
-            let point =
-                ContactPoint { a, b, position, normal, gap, surface, anchor, normal_force, is_cancelled, feature };
+            let point = ContactPoint {
+                a,
+                b,
+                position,
+                normal,
+                gap,
+                surface,
+                anchor,
+                normal_force,
+                blow,
+                is_cancelled,
+                feature,
+            };
             pair.points.push(point);
         }
         pair.touch = meeting.closest(&pair.points, pair.last_touch.is_some(), settings);

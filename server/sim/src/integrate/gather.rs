@@ -192,7 +192,10 @@ impl Integrator {
                 let arm = |i: usize| if turns[i] { contact.position - origins[i] } else { DVec3::ZERO };
                 let arms = [arm(0), arm(1)];
                 let closing = |of: [Twist; 2]| contact.normal.dot(of[0].at(arms[0]) - of[1].at(arms[1]));
-                let approach = Approach { now: closing(now), free: closing(free) };
+                let bounces = contact.surface.restitution > 0.0;
+                let mobility = |i: usize| solve.mobility(ends[i], arms[i], contact.normal);
+                let at_point = if bounces { (mobility(0) + mobility(1)).recip() } else { mass };
+                let approach = Approach { now: closing(now), free: closing(free), mass: at_point };
                 let term = ContactTerm::new(frames, contact, arms, mass, approach, settings, *dt);
                 solve.problem.terms.contacts.push(term);
             }
@@ -289,6 +292,16 @@ impl Solve {
                 attachment.map_or(0.0, |attachment| attachment.inverse_inertia)
             }
         }
+    }
+
+    /// How a point at `arm` from an end's frame gives way to a force along `direction`, 1/kg; 0 for the world.
+    fn mobility(&self, end: End, arm: DVec3, direction: DVec3) -> f64 {
+        let lever = arm.cross(direction);
+        let turning = match self.node(end.frame) {
+            Some(node) if node.rotates => lever.dot(node.inverse_inertia * lever),
+            _ => self.inverse_inertia(end) * lever.length_squared(),
+        };
+        self.mass(end).recip() + turning
     }
 
     /// What the stiffness of a joint against turns of two ends is measured with.

@@ -235,6 +235,7 @@ impl Solve {
         for (term, &source) in problem.terms.contacts.iter().zip(&self.contacts) {
             let (contact, at) = (&mut scene.contacts[source as usize], problem.pair(term));
             contact.anchor = finite_or_zero(term.final_anchor(dt, at));
+            contact.blow = term.final_blow(dt, at);
             contact.normal_force = finite_or_zero(DVec3::X * term.normal_force(dt, at)).x;
             report.worst_penetration = report.worst_penetration.max(term.final_depth(dt, at));
         }

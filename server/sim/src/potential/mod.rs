@@ -16,6 +16,7 @@ pub(crate) mod hold;
 pub(crate) mod limit;
 pub(crate) mod motor;
 pub(crate) mod pd;
+pub(crate) mod restitution;
 pub(crate) mod rod;
 pub(crate) mod slider;
 pub(crate) mod spring;

@@ -14,6 +14,7 @@ mod natural;
 mod over_determined;
 mod own_kind;
 mod potentials;
+mod restitution;
 mod sheep;
 mod sheep_forms;
 mod solvers;
