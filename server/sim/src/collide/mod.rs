@@ -4,6 +4,9 @@
 //! points. What comes out are contact points; [`potential::contact`](crate::potential) makes potentials of them.
 
 mod collision;
+mod convex;
+mod core;
+mod gjk;
 mod groups;
 mod half_space;
 mod hull;
@@ -12,6 +15,7 @@ pub mod kdop_tree;
 mod manifold;
 mod material;
 mod narrow_phase;
+mod proximity;
 mod shape;
 mod trees;
 
@@ -22,6 +26,7 @@ use glam::{DQuat, DVec3};
 pub use collision::{Collision, CollisionId, CollisionObject, CollisionSide, Phase};
 pub use groups::Groups;
 pub use material::{Material, MaterialId, Surface};
+pub use proximity::{At, Proximity, proximity};
 pub use shape::{Collider, HULL_POINTS_MAX, Shape};
 
 use crate::dof::{BodyId, Placed, Pose, Twist};

@@ -1,17 +1,16 @@
 //! Fine detection: contact points of pairs that may touch, found again from tick to tick.
 //!
-//! Half-spaces are ours, in closed form; everything else is parry's (GJK on support maps with border radius, EPA for
-//! what overlaps, feature clipping for the manifold).
+//! Half-spaces are in closed form; everything else is GJK on cores with extrusion radius, EPA for cores that overlap, and
+//! clipped faces (`convex`).
 
 use arrayvec::ArrayVec;
 use glam::DVec3;
-use parry3d_f64::math::Pose as ParryPose;
-use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
-use parry3d_f64::shape::PackedFeatureId;
 
 use super::collision::{Closest, Meeting, Phase, Touch};
+use super::convex::{Finder, NAMELESS};
 use super::half_space;
 use super::manifold::{Manifold, ManifoldPoint, POINTS_MAX};
+use super::proximity::Proximity;
 use super::shape::{Collider, Shape};
 use super::{ContactPoint, Moving, Partner, Surface};
 use crate::dof::Pose;
@@ -21,14 +20,11 @@ use crate::settings::Settings;
 /// A point without a name of its own is found again where it lies within this of its place last tick, m.
 const SAME_POINT: f64 = 0.02;
 
-/// Name of a point whose features parry does not know.
-const NAMELESS: u32 = u32::MAX;
-
 /// What is kept of a pair from tick to tick.
 struct Pair {
     points: ArrayVec<ContactPoint, POINTS_MAX>,
-    /// Parry's own memory of the pair: the last separating direction.
-    parry: ContactManifold<(), ()>,
+    /// Last normal in the axes of the first shape's core.
+    normal: Option<DVec3>,
     /// That it sees only: its points are no contacts.
     is_sensor: bool,
     /// Where it touches in this tick, and where it did in the last.
@@ -39,16 +35,9 @@ struct Pair {
 }
 
 impl Pair {
-    fn new() -> Self {
-        let (points, parry) = (ArrayVec::new(), ContactManifold::new());
-        Self { points, parry, is_sensor: false, touch: None, last_touch: None, impulse: 0.0 }
-    }
-
     /// Nothing is known of it.
-    fn clear(&mut self) {
-        let parry = std::mem::take(&mut self.parry);
-        *self = Self { parry, ..Self::new() };
-        self.parry.clear();
+    fn new() -> Self {
+        Self { points: ArrayVec::new(), normal: None, is_sensor: false, touch: None, last_touch: None, impulse: 0.0 }
     }
 
     /// Starts a tick.
@@ -96,6 +85,7 @@ pub(super) struct NarrowPhase {
     pairs: Vec<Known>,
     /// Places of pairs that ended, to be used again.
     spare: Vec<u32>,
+    finder: Finder,
     manifold: Manifold,
 }
 
@@ -113,7 +103,7 @@ impl NarrowPhase {
         self.manifold.clear();
         let key = (a.serial, Partner::Body(b.serial));
         let pair = self.take(key, a.collider.is_sensor() || b.collider.is_sensor(), settings);
-        self.parry(pair, (a.collider, a.pose), (b.collider, b.pose), margin);
+        self.convex(pair, (a.collider, a.pose), (b.collider, b.pose), margin);
         self.update(key, pair, &Meeting { a, b: Some(b), surface }, settings);
     }
 
@@ -144,7 +134,7 @@ impl NarrowPhase {
             return;
         }
         let pair = self.take(key, is_sensor, settings);
-        self.parry(pair, (a.collider, a.pose), (piece, pose), margin);
+        self.convex(pair, (a.collider, a.pose), (piece, pose), margin);
         self.update(key, pair, &meeting, settings);
     }
 
@@ -205,34 +195,29 @@ impl NarrowPhase {
     /// Place in memory of a pair of which nothing is known.
     fn blank(&mut self) -> u32 {
         if let Some(place) = self.spare.pop() {
-            self.memory[place as usize].clear();
+            self.memory[place as usize] = Pair::new();
             return place;
         }
         self.memory.push(Pair::new());
         self.memory.len() as u32 - 1
     }
 
-    /// Asks parry for the manifold of two convex shapes.
-    fn parry(&mut self, pair: usize, a: (&Collider, Pose), b: (&Collider, Pose), margin: f64) {
-        let (Some((shape_a, pose_a)), Some((shape_b, pose_b))) = (a.0.placed(a.1), b.0.placed(b.1)) else {
-            return;
-        };
-        let manifold = &mut self.memory[pair].parry;
-        let relative: ParryPose = pose_a.inv_mul(&pose_b);
-        // Parry clones the old points to carry its own data over; we have our own, and an empty clone is free.
-        manifold.points.clear();
-        let (shape_a, shape_b) = (&*shape_a.0, &*shape_b.0);
-        let dispatcher = DefaultQueryDispatcher;
-        if dispatcher.contact_manifold_convex_convex(&relative, shape_a, shape_b, None, None, margin, manifold).is_err()
-        {
-            return;
-        }
-        self.manifold.normal = pose_a.rotation * manifold.local_n1;
-        for point in manifold.points.iter().filter(|p| p.dist < margin) {
-            let on_a = pose_a * point.local_p1;
-            let on_b = pose_b * point.local_p2;
-            let feature = name(point.fid1, point.fid2);
-            self.manifold.offer(ManifoldPoint { position: (on_a + on_b) / 2.0, gap: point.dist, feature });
+    /// The nearest points of two shapes.
+    pub fn proximity(&mut self, a: (&Collider, Pose), b: (&Collider, Pose), margin: f64) -> Option<Proximity> {
+        let pair = self.blank() as usize;
+        self.manifold.clear();
+        self.convex(pair, a, b, margin);
+        let normal = self.manifold.normal;
+        let nearest = self.manifold.reduced().iter().min_by(|a, b| a.gap.total_cmp(&b.gap))?;
+        Some(Proximity { gap: nearest.gap, normal, point: nearest.position })
+    }
+
+    /// Finds the manifold of two convex shapes.
+    fn convex(&mut self, pair: usize, a: (&Collider, Pose), b: (&Collider, Pose), margin: f64) {
+        let Self { memory, finder, manifold, .. } = self;
+        if let (Some(a), Some(b)) = (a.0.convex(a.1), b.0.convex(b.1)) {
+            let normal = &mut memory[pair].normal;
+            *normal = finder.contacts(a, b, margin, *normal, manifold);
         }
     }
 
@@ -288,12 +273,4 @@ fn reach(body: &Moving, settings: &Settings) -> f64 {
         _ => spin,
     };
     (settings.dt * across.length()).min(2.0) * body.collider.bounding_radius()
-}
-
-fn name(a: PackedFeatureId, b: PackedFeatureId) -> u32 {
-    if a == PackedFeatureId::UNKNOWN || b == PackedFeatureId::UNKNOWN {
-        return NAMELESS;
-    }
-    // 28 bits of feature and two of kind each; folding keeps them apart well enough within one pair.
-    a.0.rotate_left(16) ^ b.0
 }

@@ -4,8 +4,10 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::{DQuat, DVec3};
 use parry3d_f64::math::Pose as ParryPose;
-use parry3d_f64::shape::SharedShape;
+use parry3d_f64::shape::{Cuboid, Cylinder, Segment};
 
+use super::convex::Convex;
+use super::core::{Core, Point, Polytope};
 use super::groups::Groups;
 use super::material::Material;
 use crate::error::{SimError, require, require_vector};
@@ -44,11 +46,11 @@ pub enum Shape {
         /// Extrusion radius of the edges; less than the other two.
         rounding: f64,
     },
-    /// Convex hull of points, extruded.
+    /// Convex hull of points, extruded: a point becomes a ball, an edge a cylinder with round ends, a polygon a plate.
     Hull {
-        /// At least four points that do not lie in a plane, at most 256.
+        /// 1 to 256 points.
         points: Vec<DVec3>,
-        /// Extrusion radius.
+        /// Extrusion radius; above 0 where the points lie in a plane.
         radius: f64,
     },
 }
@@ -80,10 +82,10 @@ impl Shape {
             }
             Self::Hull { points, radius } => {
                 let count = points.len();
-                require((4..=HULL_POINTS_MAX).contains(&count), "points", count as f64, "4 to 256")?;
+                require((1..=HULL_POINTS_MAX).contains(&count), "points", count as f64, "1 to 256")?;
                 points.iter().try_for_each(|&p| require_vector(p, "points"))?;
                 require((0.0..1e6).contains(radius), "radius", *radius, "0 to below 1e6 m")?;
-                spans_a_volume(points)
+                if *radius > 0.0 { Ok(()) } else { spans_a_volume(points) }
             }
         }
     }
@@ -130,26 +132,24 @@ impl Shape {
         (-half, half)
     }
 
-    /// The same shape as parry knows it. Parry's cylinders stand along y: see [`Shape::parry_rotation`].
-    fn parry(&self) -> Result<SharedShape, SimError> {
-        let flat = SimError::Unusable { what: FLAT_HULL };
-        Ok(match self {
-            Self::HalfSpace { normal } => SharedShape::halfspace(*normal),
-            Self::Ball { radius } => SharedShape::ball(*radius),
-            Self::Box { half } => SharedShape::cuboid(half.x, half.y, half.z),
-            Self::Capsule { half_length, radius } => SharedShape::capsule_x(*half_length, *radius),
+    /// What is extruded, and by how much; `None` for a half-space.
+    fn core(&self) -> Option<(Core, f64)> {
+        Some(match self {
+            Self::HalfSpace { .. } => return None,
+            Self::Ball { radius } => (Core::Point(Point), *radius),
+            Self::Box { half } => (Core::Box(Cuboid::new(*half)), 0.0),
+            Self::Capsule { half_length, radius } => {
+                (Core::Segment(Segment::new(DVec3::NEG_X * *half_length, DVec3::X * *half_length)), *radius)
+            }
             Self::Cylinder { half_length, radius, rounding } => {
-                SharedShape::round_cylinder(half_length - rounding, radius - rounding, *rounding)
+                (Core::Cylinder(Cylinder::new(half_length - rounding, radius - rounding)), *rounding)
             }
-            Self::Hull { points, radius } if *radius > 0.0 => {
-                SharedShape::round_convex_hull(points, *radius).ok_or(flat)?
-            }
-            Self::Hull { points, .. } => SharedShape::convex_hull(points).ok_or(flat)?,
+            Self::Hull { points, radius } => (Core::Polytope(Polytope::new(points.clone())), *radius),
         })
     }
 
-    /// Turns parry's axes of the shape into the body's.
-    fn parry_rotation(&self) -> DQuat {
+    /// Turns the axes of the core into the body's: cylinders stand along y there.
+    fn core_rotation(&self) -> DQuat {
         match self {
             Self::Cylinder { .. } => DQuat::from_rotation_x(FRAC_PI_2),
             _ => DQuat::IDENTITY,
@@ -157,7 +157,7 @@ impl Shape {
     }
 }
 
-const FLAT_HULL: &str = "points of a hull lie in a plane";
+const FLAT_HULL: &str = "points of a hull lie in a plane: give it a radius, or a point beside the plane";
 
 /// A hull is flat where its height is less than this fraction of its length.
 const FLATTEST: f64 = 1e-6;
@@ -185,19 +185,21 @@ pub struct Collider {
     material: Material,
     groups: Groups,
     is_sensor: bool,
-    /// The shape for the fine phase, with its rotation into the body's frame. Built once: hulls are costly.
-    parry: Option<(SharedShape, DQuat)>,
+    /// The shape for the fine phase: its core, the extrusion radius and the core's rotation into the body's frame. Built
+    /// once: hulls are costly.
+    core: Option<(Core, f64, DQuat)>,
     bounding_radius: f64,
 }
 
 impl Collider {
     /// A collider of a material, or with a Coulomb coefficient of friction and nothing else.
     pub fn new(shape: Shape, material: impl Into<Material>) -> Self {
-        // What does not validate is never handed to parry.
-        let parry = shape.validate().and_then(|()| shape.parry()).ok().map(|parry| (parry, shape.parry_rotation()));
+        // What does not validate has no core.
+        let core = shape.validate().ok().and_then(|()| shape.core());
+        let core = core.map(|(core, radius)| (core, radius, shape.core_rotation()));
         let bounding_radius = shape.bounding_radius();
         let (material, groups, is_sensor) = (material.into(), Groups::ALL, false);
-        Self { shape, material, groups, is_sensor, parry, bounding_radius }
+        Self { shape, material, groups, is_sensor, core, bounding_radius }
     }
 
     /// The same in other groups.
@@ -243,9 +245,7 @@ impl Collider {
     /// [`SimError`] naming the first value that is out of range.
     pub fn validate(&self) -> Result<(), SimError> {
         self.material.surface.validate()?;
-        self.shape.validate()?;
-        // What passes the checks above and is still no hull would pass through everything.
-        if self.parry.is_some() { Ok(()) } else { Err(SimError::Unusable { what: FLAT_HULL }) }
+        self.shape.validate()
     }
 
     /// [`Collider::validate`] for what moves.
@@ -259,10 +259,11 @@ impl Collider {
         }
     }
 
-    /// Shape for the fine phase and its pose, given the body's.
-    pub(crate) fn placed(&self, pose: crate::dof::Pose) -> Option<(&SharedShape, ParryPose)> {
-        let (shape, rotation) = self.parry.as_ref()?;
-        Some((shape, ParryPose::from_parts(pose.position, pose.rotation * *rotation)))
+    /// The shape for the fine phase, given the body's pose; `None` for a half-space.
+    pub(super) fn convex(&self, pose: crate::dof::Pose) -> Option<Convex<'_>> {
+        let (core, radius, rotation) = self.core.as_ref()?;
+        let pose = ParryPose::from_parts(pose.position, pose.rotation * *rotation);
+        Some(Convex { core: core.map(), radius: *radius, pose, constraints: None })
     }
 }
 

@@ -7,6 +7,7 @@ mod collisions;
 mod contact_events;
 mod determinism;
 mod elasticity;
+mod fine_phase;
 mod hostile;
 mod joints;
 mod lattice;

@@ -1,0 +1,156 @@
+//! Nearest points of two convex cores: parry's GJK, and EPA where they overlap, with their answers checked.
+//!
+//! GJK's and EPA's answers are proposals. What counts is the separation along the normal that they propose, two support
+//! points away, which holds whatever went wrong on the way. Where it disagrees with the points that come with it, other
+//! starts are tried, and the best normal of all is polished.
+
+use glam::DVec3;
+use parry3d_f64::math::Pose as ParryPose;
+use parry3d_f64::query::epa::EPA;
+use parry3d_f64::query::gjk::{CsoPoint, GJKResult, VoronoiSimplex, closest_points};
+use parry3d_f64::shape::PolygonalFeatureMap;
+
+/// How far the separation along the normal may be from the distance of the points, m. A tenth of what the check against
+/// the slow reference (`examples/gjk_reference`) allows.
+const AGREEMENT: f64 = 1e-7;
+
+/// Most rounds of polishing a normal.
+const POLISHING_MAX: u32 = 600;
+
+/// Crosses of directions that are tried before the step is halved.
+const TURNS: u32 = 4;
+
+/// rad; no two crosses are alike.
+const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+
+/// Two cores, the second seen from the first.
+#[derive(Clone, Copy)]
+pub(super) struct Pair<'a> {
+    pub a: &'a dyn PolygonalFeatureMap,
+    pub b: &'a dyn PolygonalFeatureMap,
+    /// Pose of `b` in `a`'s axes.
+    pub b_in_a: &'a ParryPose,
+}
+
+/// Nearest points of two cores, in the first one's axes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nearest {
+    /// Unit vector from the first to the second.
+    pub normal: DVec3,
+    /// Along the normal, m; negative where they overlap.
+    pub gap: f64,
+    pub on_a: DVec3,
+    pub on_b: DVec3,
+}
+
+/// Memory of GJK and EPA, used again by every pair.
+#[derive(Default)]
+pub(super) struct Workspace {
+    simplex: VoronoiSimplex,
+    epa: EPA,
+}
+
+/// A gap that is not known to be wider than `within`, or a direction along which it is.
+pub(super) enum Found {
+    Beyond(DVec3),
+    Nearest(Nearest),
+}
+
+impl Pair<'_> {
+    /// How far apart the cores are along a unit normal, m.
+    fn separation(&self, normal: DVec3) -> f64 {
+        -CsoPoint::from_shapes(self.b_in_a, self.a, self.b, normal).point.dot(normal)
+    }
+
+    /// The nearest points. `guess` is the normal of last time.
+    pub fn nearest(&self, within: f64, guess: Option<DVec3>, workspace: &mut Workspace) -> Found {
+        let middle = self.b_in_a.translation.try_normalize();
+        let first = guess.or(middle).unwrap_or(DVec3::X);
+        let mut best = match self.propose(first, within, workspace) {
+            Some(Found::Nearest(nearest)) if nearest.agrees() => return Found::Nearest(nearest),
+            Some(Found::Nearest(nearest)) => nearest,
+            Some(beyond) => return beyond,
+            None => self.along(first),
+        };
+        for start in middle.into_iter().chain(DVec3::AXES).flat_map(|d| [d, -d]) {
+            let found = self.propose(start, within, workspace);
+            let nearest = match found {
+                Some(Found::Nearest(nearest)) if nearest.agrees() => return Found::Nearest(nearest),
+                Some(Found::Nearest(nearest)) => nearest,
+                Some(beyond) => return beyond,
+                None => self.along(start),
+            };
+            if nearest.gap > best.gap {
+                best = nearest;
+            }
+        }
+        let best = self.polished(best);
+        match self.propose(best.normal, within, workspace) {
+            Some(Found::Nearest(nearest)) if nearest.agrees() => Found::Nearest(nearest),
+            _ => Found::Nearest(best),
+        }
+    }
+
+    /// What GJK and EPA say from one start, if anything.
+    fn propose(&self, start: DVec3, within: f64, workspace: &mut Workspace) -> Option<Found> {
+        let Workspace { simplex, epa } = workspace;
+        simplex.reset(CsoPoint::from_shapes(self.b_in_a, self.a, self.b, start));
+        let (on_a, on_b, normal) = match closest_points(self.b_in_a, self.a, self.b, within, true, simplex) {
+            GJKResult::ClosestPoints(on_a, on_b, normal) => (on_a, on_b, normal),
+            GJKResult::Intersection => epa.closest_points(self.b_in_a, self.a, self.b, simplex)?,
+            // It says so too where it gave up.
+            GJKResult::NoIntersection(normal) if self.separation(normal) > within => {
+                return Some(Found::Beyond(normal));
+            }
+            GJKResult::NoIntersection(_) | GJKResult::Proximity(_) => return None,
+        };
+        let normal = normal.try_normalize()?;
+        (on_a.is_finite() && on_b.is_finite())
+            .then(|| Found::Nearest(Nearest { normal, gap: self.separation(normal), on_a, on_b }))
+    }
+
+    /// What a normal by itself says.
+    fn along(&self, normal: DVec3) -> Nearest {
+        let CsoPoint { orig1, orig2, .. } = CsoPoint::from_shapes(self.b_in_a, self.a, self.b, normal);
+        Nearest { normal, gap: (orig2 - orig1).dot(normal), on_a: orig1, on_b: orig2 }
+    }
+
+    /// Turns the normal to where the cores are farthest apart.
+    fn polished(&self, from: Nearest) -> Nearest {
+        let mut best = from;
+        let (mut step, mut failures) = (0.1, 0);
+        for round in 0..POLISHING_MAX {
+            if step < 1e-9 {
+                break;
+            }
+            // Another cross of directions each time: along one that does not change, a ridge is not climbed.
+            let (u, v) = best.normal.any_orthonormal_pair();
+            let (sin, cos) = (f64::from(round) * GOLDEN_ANGLE).sin_cos();
+            let (u, v) = (u * cos + v * sin, v * cos - u * sin);
+            let better = [u, v, -u, -v].into_iter().find_map(|d| {
+                let normal = (best.normal + step * d).normalize();
+                let gap = self.separation(normal);
+                (gap > best.gap).then_some(Nearest { normal, gap, ..best })
+            });
+            match better {
+                Some(better) => (best, failures) = (better, 0),
+                None => failures += 1,
+            }
+            if failures == TURNS {
+                (step, failures) = (0.5 * step, 0);
+            }
+        }
+        if best.normal == from.normal { from } else { self.along(best.normal) }
+    }
+}
+
+impl Nearest {
+    /// Whether the points are as far apart as the cores are along the normal.
+    fn agrees(&self) -> bool {
+        let apart = self.on_b - self.on_a;
+        let along = apart.dot(self.normal);
+        let scale = self.on_a.abs().max(self.on_b.abs()).max_element();
+        let tolerance = AGREEMENT + 1e-13 * scale;
+        (along - self.gap).abs() < tolerance && (apart.length() - self.gap.abs()).abs() < tolerance
+    }
+}
