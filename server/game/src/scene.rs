@@ -43,7 +43,8 @@ pub struct SceneError {
 }
 
 impl Scene {
-    /// Reads a scene. `settings` gives tick length and solver; the scene's gravity replaces theirs.
+    /// Reads a scene. `settings` gives tick length and solver; the scene's gravity replaces theirs, and nothing sleeps:
+    /// scenes are measured beside engines whose bodies do not.
     ///
     /// # Errors
     /// [`SceneError`] naming the line.
@@ -52,7 +53,7 @@ impl Scene {
         if lines.len() > LINES_MAX {
             return Err(SceneError { line: LINES_MAX, what: format!("more than {LINES_MAX} lines") });
         }
-        let mut settings = settings.clone();
+        let mut settings = Settings { sleep: None, ..settings.clone() };
         if let Some(line) = lines.iter().find(|line| line.word == "gravity") {
             settings.gravity = line.numbers::<3>()?.into();
         }

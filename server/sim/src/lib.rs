@@ -28,6 +28,7 @@ pub mod mass;
 pub mod mesh;
 pub mod potential;
 mod settings;
+mod sleep;
 mod state;
 mod world;
 
@@ -50,5 +51,5 @@ pub use potential::{
     DistanceLimitId, Driven, FixedJointDesc, FixedJointId, HingeDesc, HingeId, Motor, MotorDesc, MotorId, PdControl,
     PdDesc, PdId, RodDesc, RodId, SliderDesc, SliderId, SpringDesc, SpringId, UniversalJointDesc, UniversalJointId,
 };
-pub use settings::{ContactSettings, Settings, SolverSettings};
+pub use settings::{ContactSettings, Settings, SleepSettings, SolverSettings};
 pub use world::{Energy, Momentum, SliceView, World};

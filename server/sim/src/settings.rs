@@ -19,6 +19,20 @@ pub struct Settings {
     pub solver: SolverSettings,
     /// The contact model's parameters.
     pub contact: ContactSettings,
+    /// When islands fall asleep; `None` keeps everything awake.
+    pub sleep: Option<SleepSettings>,
+}
+
+/// When an island falls asleep: no part of it was faster than this for a while, nor became faster or slower. What sleeps
+/// has no speed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SleepSettings {
+    /// m/s. What rests trembles by up to 3 mm/s; what is slower than this on purpose stops.
+    pub linear_speed: f64,
+    /// rad/s.
+    pub angular_speed: f64,
+    /// For how long, s. Anything that passes its highest point is slow for a moment.
+    pub time: f64,
 }
 
 /// Parameters of the integrator.
@@ -74,6 +88,7 @@ impl Settings {
             threads: 1,
             solver: SolverSettings::default(),
             contact: ContactSettings::default(),
+            sleep: Some(SleepSettings::default()),
         }
     }
 
@@ -104,7 +119,11 @@ impl Settings {
         require((1e-9..=1.0).contains(&transition), "contact.transition", transition, "1e-9 to 1 m")?;
         require((0.0..=1e3).contains(&recovery_speed), "contact.recovery_speed", recovery_speed, "0 to 1000 m/s")?;
         require((0.0..=1e3).contains(&collision_speed), "contact.collision_speed", collision_speed, "0 to 1000 m/s")?;
-        require((0.0..=10.0).contains(&margin), "contact.margin", margin, "0 to 10 m")
+        require((0.0..=10.0).contains(&margin), "contact.margin", margin, "0 to 10 m")?;
+        let Some(SleepSettings { linear_speed, angular_speed, time }) = self.sleep else { return Ok(()) };
+        require((0.0..=1.0).contains(&linear_speed), "sleep.linear_speed", linear_speed, "0 to 1 m/s")?;
+        require((0.0..=10.0).contains(&angular_speed), "sleep.angular_speed", angular_speed, "0 to 10 rad/s")?;
+        require((0.0..=3600.0).contains(&time), "sleep.time", time, "0 to 3600 s")
     }
 }
 
@@ -128,6 +147,12 @@ impl Default for SolverSettings {
             sweeps: 4,
             joint_stiffness: 3e4,
         }
+    }
+}
+
+impl Default for SleepSettings {
+    fn default() -> Self {
+        Self { linear_speed: 5e-3, angular_speed: 2e-2, time: 0.5 }
     }
 }
 

@@ -169,6 +169,8 @@ pub(crate) struct Detector {
     narrow_phase: NarrowPhase,
     /// Contacts of this tick, in order of pair.
     pub contacts: Vec<ContactPoint>,
+    /// Bodies that something touched in their sleep.
+    pub touched: Vec<BodyId>,
     /// What there is to tell of pairs in this tick, in order of pair.
     touches: Vec<Touch>,
     /// Counts detections.
@@ -293,33 +295,70 @@ impl Detector {
         self.narrow_phase.forget(|(a, b)| a == serial || b == Partner::Body(serial));
     }
 
-    /// Finds all contact points.
-    pub fn detect(&mut self, bodies: Bodies, settings: &Settings) {
-        self.trees.update(bodies, settings);
+    /// Starts a tick.
+    pub fn begin(&mut self) {
+        self.trees.begin();
         self.narrow_phase.begin();
+    }
+
+    /// Finds the contacts of everything that is awake, and when called again, of what woke since. Answers whether anything
+    /// sleeping was touched: [`Detector::touched`] has it.
+    pub fn meet(&mut self, bodies: Bodies, settings: &Settings) -> bool {
+        self.trees.update(bodies, settings);
         self.meet_bodies(bodies, settings);
         self.meet_statics(bodies, settings);
+        !self.touched.is_empty()
+    }
+
+    /// Ends a tick: all contact points, and what there is to tell of pairs.
+    pub fn finish(&mut self, settings: &Settings) {
         self.contacts.clear();
         self.touches.clear();
         self.detections += 1;
         self.narrow_phase.finish(&mut self.contacts, &mut self.touches, settings);
     }
 
+    /// Pairs of the tick that the fine phase looked at.
+    pub fn pairs(&self) -> usize {
+        self.narrow_phase.len()
+    }
+
+    /// Colliders of bodies that fall asleep together, in order of serial. What is known of their contacts is kept.
+    pub fn sleep(&mut self, colliders: &[Placed], bodies: Bodies, settings: &Settings) {
+        colliders.iter().for_each(|placed| self.trees.sleep(placed.hull, bodies, settings));
+        self.trees.sort_awake();
+        let sleeps = |serial: u32| colliders.binary_search_by_key(&serial, |placed| placed.serial).is_ok();
+        self.narrow_phase.sleep(sleeps);
+    }
+
+    /// Colliders of bodies that wake.
+    pub fn wake(&mut self, colliders: &[Placed]) {
+        colliders.iter().for_each(|placed| self.trees.wake(placed.hull));
+        self.trees.sort_awake();
+        self.narrow_phase.wake(colliders.iter().map(|placed| placed.serial));
+    }
+
+    /// Bodies that sleep on, or in, a piece of static geometry; `None` where nobody knows: it has no bounds.
+    pub fn sleepers_around(&mut self, id: StaticId) -> Option<Vec<BodyId>> {
+        self.statics.get(id).map_or(Some(Vec::new()), |piece| piece.piece.map(|key| self.trees.sleepers_around(key)))
+    }
+
     /// The fine phase of all pairs of bodies that may touch.
     fn meet_bodies(&mut self, bodies: Bodies, settings: &Settings) {
         let excludes = |a: u32, b: u32| self.excluded.binary_search(&(a.min(b), a.max(b))).is_ok();
-        for pair in self.trees.pairs() {
+        for (pair, sleeper) in self.trees.pairs() {
             let [Some(a), Some(b)] = pair.map(|hull| hull.moving(bodies)) else { continue };
             if a.collider.meets(b.collider) && !excludes(a.owner, b.owner) {
                 let surface = self.materials.contact(a.collider.material(), b.collider.material());
-                self.narrow_phase.bodies(&a, &b, surface, settings);
+                let touches = self.narrow_phase.bodies(&a, &b, surface, settings);
+                self.touched.extend(sleeper.filter(|_| touches));
             }
         }
     }
 
     /// The fine phase of all bodies with the static geometry that they may touch.
     fn meet_statics(&mut self, bodies: Bodies, settings: &Settings) {
-        let unbounded = self.trees.awake().flat_map(|hull| self.unbounded.iter().map(move |&id| (hull, id)));
+        let unbounded = self.trees.arrivals().flat_map(|hull| self.unbounded.iter().map(move |&id| (hull, id)));
         for (hull, id) in self.trees.pairs_with_fixed().chain(unbounded) {
             let (Some(body), piece) = (hull.moving(bodies), &self.statics[id]) else { continue };
             if body.collider.meets(&piece.collider) {

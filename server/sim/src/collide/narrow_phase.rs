@@ -3,6 +3,8 @@
 //! Half-spaces are in closed form; everything else is GJK on cores with extrusion radius, EPA for cores that overlap, and
 //! clipped faces (`convex`).
 
+use std::collections::BTreeMap;
+
 use arrayvec::ArrayVec;
 use glam::DVec3;
 
@@ -83,6 +85,8 @@ pub(super) struct NarrowPhase {
     last: Vec<Known>,
     /// Pairs of this tick, in the order in which they were asked for; sorted by key at its end.
     pairs: Vec<Known>,
+    /// Places of pairs that sleep.
+    asleep: BTreeMap<Key, u32>,
     /// Places of pairs that ended, to be used again.
     spare: Vec<u32>,
     finder: Finder,
@@ -93,11 +97,45 @@ impl NarrowPhase {
     /// Starts a tick.
     pub fn begin(&mut self) {
         std::mem::swap(&mut self.last, &mut self.pairs);
-        self.pairs.clear();
+        // What woke since.
+        self.last.append(&mut self.pairs);
+        self.last.sort_unstable_by_key(Known::key);
     }
 
-    /// Contacts of two bodies.
-    pub fn bodies(&mut self, a: &Moving, b: &Moving, surface: Surface, settings: &Settings) {
+    /// Pairs of the tick.
+    pub fn len(&self) -> usize {
+        self.pairs.len()
+    }
+
+    /// Sets aside what is known of pairs between colliders of which `sleeps` says so, and between them and static
+    /// geometry.
+    pub fn sleep(&mut self, sleeps: impl Fn(u32) -> bool) {
+        let Self { pairs, asleep, .. } = self;
+        pairs.retain(|&Known { key: (a, b), place }| {
+            let partner_sleeps = match b {
+                Partner::Body(b) => sleeps(b),
+                Partner::Static(_) => true,
+            };
+            let both = partner_sleeps && sleeps(a);
+            asleep.extend(place.filter(|_| both).map(|place| ((a, b), place)));
+            !both
+        });
+    }
+
+    /// Colliders wake: the next pairs of theirs are found again.
+    pub fn wake(&mut self, serials: impl Iterator<Item = u32>) {
+        for serial in serials {
+            let first = (serial, Partner::Body(0));
+            while let Some((&key, _)) = self.asleep.range(first..).next().filter(|(key, _)| key.0 == serial) {
+                let place = self.asleep.remove(&key);
+                self.last.push(Known { key, place });
+            }
+        }
+        self.last.sort_unstable_by_key(Known::key);
+    }
+
+    /// Contacts of two bodies. Answers whether there are any that push.
+    pub fn bodies(&mut self, a: &Moving, b: &Moving, surface: Surface, settings: &Settings) -> bool {
         let margin =
             margin((a.twist.linear - b.twist.linear).length(), reach(a, settings) + reach(b, settings), settings);
         self.manifold.clear();
@@ -105,6 +143,8 @@ impl NarrowPhase {
         let pair = self.take(key, a.collider.is_sensor() || b.collider.is_sensor(), settings);
         self.convex(pair, (a.collider, a.pose), (b.collider, b.pose), margin);
         self.update(key, pair, &Meeting { a, b: Some(b), surface }, settings);
+        let pair = &self.memory[pair];
+        !pair.is_sensor && !pair.points.is_empty()
     }
 
     /// Contacts of a body with a piece of static geometry.
@@ -173,12 +213,14 @@ impl NarrowPhase {
 
     /// Drops every pair of which `is_gone` says so.
     pub fn forget(&mut self, is_gone: impl Fn(Key) -> bool) {
-        let Self { pairs, spare, .. } = self;
-        pairs.retain(|&Known { key, place }| {
-            let gone = is_gone(key);
-            spare.extend(place.filter(|_| gone));
-            !gone
-        });
+        let Self { pairs, last, spare, .. } = self;
+        for list in [pairs, last] {
+            list.retain(|&Known { key, place }| {
+                let gone = is_gone(key);
+                spare.extend(place.filter(|_| gone));
+                !gone
+            });
+        }
     }
 
     /// Place in memory of a pair, with what the last tick left there where it has been one.

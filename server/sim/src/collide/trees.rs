@@ -3,27 +3,45 @@
 //! Owns the bounds of all hulls and pieces of static geometry. A pair is known for as long as neither side leaves the
 //! somewhat wider bounds that its tree keeps, so that what rests is not searched for again. Which pairs come out, and in
 //! which order, depends on bounds and serials alone.
+//!
+//! What wakes during a detection comes in rounds: each finds the pairs of those that have arrived with it.
 
 use slab::Slab;
 
 use super::hull::{Bodies, Hull};
 use super::kdop_tree::{KdopTree, Leaf, PairSearch};
 use super::{Bound, SLABS, StaticId};
-use crate::dof::Placed;
+use crate::dof::{BodyId, Placed};
 use crate::settings::Settings;
 
 type Tree = KdopTree<SLABS>;
 
 /// Two hulls, or a hull and a piece of static geometry, by their keys.
-pub(super) type Pair = [u32; 2];
+type Pair = [u32; 2];
+
+/// Where a hull is kept.
+#[derive(Clone, Copy)]
+enum Place {
+    /// Nowhere yet: in the dynamic tree from its next detection on.
+    New,
+    Dynamic(Leaf),
+    Sleeping(Leaf),
+}
 
 /// A hull and its place.
 struct Entry {
     hull: Hull,
-    /// In the dynamic tree; none before its first tick.
-    leaf: Option<Leaf>,
+    place: Place,
+    /// In which round of this detection it arrived.
+    round: u32,
     /// Its tree has other bounds of it than when pairs were searched last.
     has_changed: bool,
+}
+
+impl Entry {
+    fn sleeps(&self) -> bool {
+        matches!(self.place, Place::Sleeping(_))
+    }
 }
 
 /// A piece of static geometry and its place.
@@ -39,14 +57,24 @@ struct Piece {
 pub(super) struct Trees {
     entries: Slab<Entry>,
     pieces: Slab<Piece>,
-    /// Hulls that move, in order of serial.
+    /// Hulls that do not sleep, in order of serial.
     awake: Vec<u32>,
+    /// Those of them that arrived in this round.
+    arrivals: Vec<u32>,
+    /// Those of them that will in the next: they woke.
+    woken: Vec<u32>,
+    /// Those, asleep or not, that have changed.
+    changed: Vec<u32>,
+    round: u32,
     dynamic: Tree,
     fixed: Tree,
+    sleeping: Tree,
     /// Pairs of hulls that may touch, the smaller serial first.
     near: Vec<Pair>,
     /// Hulls and pieces that may touch.
     near_fixed: Vec<Pair>,
+    /// Hulls and sleepers that may touch.
+    near_sleeping: Vec<Pair>,
     search: PairSearch,
 }
 
@@ -54,20 +82,54 @@ impl Trees {
     /// Takes a hull in. Answers its key. The serials of hulls rise from call to call.
     pub fn add(&mut self, placed: Placed, owner: u32) -> u32 {
         let hull = Hull::new(placed, owner);
-        let key = self.entries.insert(Entry { hull, leaf: None, has_changed: false }) as u32;
+        let key = self.entries.insert(Entry { hull, place: Place::New, round: 0, has_changed: false }) as u32;
         self.awake.push(key);
         key
     }
 
     /// Forgets a hull.
     pub fn remove(&mut self, key: u32) {
-        let entry = self.entries.remove(key as usize);
-        if let Some(leaf) = entry.leaf {
-            self.dynamic.remove(leaf);
-        }
+        self.take_out(key);
+        self.entries.remove(key as usize);
         self.awake.retain(|&other| other != key);
-        self.near.retain(|pair| !pair.contains(&key));
+        for pairs in [&mut self.near, &mut self.near_sleeping] {
+            pairs.retain(|pair| !pair.contains(&key));
+        }
         self.near_fixed.retain(|pair| pair[0] != key);
+    }
+
+    /// Takes a hull out of its tree.
+    fn take_out(&mut self, key: u32) {
+        match self.entries[key as usize].place {
+            Place::New => {}
+            Place::Dynamic(leaf) => self.dynamic.remove(leaf),
+            Place::Sleeping(leaf) => self.sleeping.remove(leaf),
+        }
+    }
+
+    /// Puts a hull, at rest from now on, into the sleeping tree. [`Trees::sort_awake`] follows.
+    pub fn sleep(&mut self, key: u32, bodies: Bodies, settings: &Settings) {
+        self.take_out(key);
+        let entry = &mut self.entries[key as usize];
+        entry.hull.follow(bodies, settings);
+        entry.place = Place::Sleeping(self.sleeping.insert(key, entry.hull.bounds));
+        entry.has_changed = true;
+        self.changed.push(key);
+    }
+
+    /// Takes a hull out of the sleeping tree. [`Trees::sort_awake`] follows.
+    pub fn wake(&mut self, key: u32) {
+        self.take_out(key);
+        self.entries[key as usize].place = Place::New;
+        self.awake.push(key);
+        self.woken.push(key);
+    }
+
+    /// Brings the list of those that are awake up to date.
+    pub fn sort_awake(&mut self) {
+        let Self { entries, awake, .. } = self;
+        awake.retain(|&key| !entries[key as usize].sleeps());
+        awake.sort_by_key(|&key| entries[key as usize].hull.placed.serial);
     }
 
     /// Takes a piece of static geometry in. Answers its key.
@@ -85,35 +147,62 @@ impl Trees {
         self.near_fixed.retain(|pair| pair[1] != key);
     }
 
-    /// Brings all bounds up to date and finds the pairs of the tick.
+    /// Bodies that sleep within the bounds of a piece of static geometry.
+    pub fn sleepers_around(&mut self, key: u32) -> Vec<BodyId> {
+        let Self { entries, pieces, sleeping, .. } = self;
+        let mut bodies = Vec::new();
+        sleeping.refit();
+        sleeping.overlapping(&pieces[key as usize].bounds, |key| bodies.push(entries[key as usize].hull.placed.body));
+        bodies
+    }
+
+    /// Starts a detection: everything that is awake arrives.
+    pub fn begin(&mut self) {
+        self.round = 0;
+        self.woken.clone_from(&self.awake);
+    }
+
+    /// Brings the bounds of what arrived up to date and finds the pairs of this round.
     pub fn update(&mut self, bodies: Bodies, settings: &Settings) {
-        for &key in &self.awake {
-            let Entry { hull, leaf, has_changed } = &mut self.entries[key as usize];
+        self.round += 1;
+        std::mem::swap(&mut self.arrivals, &mut self.woken);
+        self.woken.clear();
+        for &key in &self.arrivals {
+            let Entry { hull, place, round, has_changed } = &mut self.entries[key as usize];
             hull.follow(bodies, settings);
-            *has_changed = match *leaf {
-                // What takes no part keeps its place and touches nothing.
-                Some(leaf) => hull.bounds != Bound::EMPTY && self.dynamic.update(leaf, &hull.bounds),
-                None => {
-                    *leaf = Some(self.dynamic.insert(key, hull.bounds));
+            *round = self.round;
+            let changes = match *place {
+                Place::New => {
+                    *place = Place::Dynamic(self.dynamic.insert(key, hull.bounds));
                     true
                 }
+                // What takes no part keeps its place and touches nothing.
+                Place::Dynamic(leaf) => hull.bounds != Bound::EMPTY && self.dynamic.update(leaf, &hull.bounds),
+                Place::Sleeping(_) => false,
             };
+            if changes {
+                *has_changed = true;
+                self.changed.push(key);
+            }
         }
-        self.dynamic.refit();
-        self.fixed.refit();
-        if self.dynamic.has_changed() || self.fixed.has_changed() {
+        let trees = [&mut self.dynamic, &mut self.fixed, &mut self.sleeping];
+        if trees.into_iter().fold(false, |any, tree| {
+            tree.refit();
+            any | tree.has_changed()
+        }) {
             self.search();
         }
     }
 
     /// Finds the pairs anew of what has changed.
     fn search(&mut self) {
-        let Self { entries, pieces, dynamic, fixed, near, near_fixed, search, .. } = self;
+        let Self { entries, pieces, dynamic, fixed, sleeping, near, near_fixed, near_sleeping, search, .. } = self;
         let entry = |key: u32| &entries[key as usize];
         let serial = |key: u32| entry(key).hull.placed.serial;
+        let strangers = |a: u32, b: u32| entry(a).hull.owner != entry(b).hull.owner;
         near.retain(|pair| !pair.iter().any(|&key| entry(key).has_changed));
         search.within(dynamic, |a, b| {
-            if entry(a).hull.owner != entry(b).hull.owner {
+            if strangers(a, b) {
                 near.push(if serial(a) < serial(b) { [a, b] } else { [b, a] });
             }
         });
@@ -121,28 +210,55 @@ impl Trees {
         near_fixed.retain(|&[hull, _]| !entry(hull).has_changed);
         search.between(dynamic, fixed, |hull, piece| near_fixed.push([hull, piece]));
         near_fixed.sort_unstable_by_key(|&[hull, piece]| (serial(hull), pieces[piece as usize].serial));
-        dynamic.settle();
-        fixed.settle();
+        near_sleeping.retain(|pair| !pair.iter().any(|&key| entry(key).has_changed));
+        search.between(dynamic, sleeping, |hull, sleeper| {
+            if strangers(hull, sleeper) {
+                near_sleeping.push([hull, sleeper]);
+            }
+        });
+        near_sleeping.sort_unstable_by_key(|pair| pair.map(serial));
+        for tree in [dynamic, fixed, sleeping] {
+            tree.settle();
+        }
+        for key in self.changed.drain(..) {
+            // What is gone has taken its pairs with it.
+            if let Some(entry) = self.entries.get_mut(key as usize) {
+                entry.has_changed = false;
+            }
+        }
     }
 
     /// A hull.
-    pub fn hull(&self, key: u32) -> &Hull {
+    fn hull(&self, key: u32) -> &Hull {
         &self.entries[key as usize].hull
     }
 
-    /// All hulls that move, in order of serial.
-    pub fn awake(&self) -> impl Iterator<Item = &Hull> {
-        self.awake.iter().map(|&key| self.hull(key))
+    /// Hulls that arrived in this round.
+    pub fn arrivals(&self) -> impl Iterator<Item = &Hull> {
+        self.arrivals.iter().map(|&key| self.hull(key))
     }
 
-    /// Pairs of hulls whose bounds overlap, in order of serials.
-    pub fn pairs(&self) -> impl Iterator<Item = [&Hull; 2]> {
-        self.near.iter().map(|pair| pair.map(|key| self.hull(key))).filter(|[a, b]| a.bounds.overlaps(&b.bounds))
+    /// Pairs of hulls of this round whose bounds overlap, the smaller serial first; and of such hulls with sleepers, whose
+    /// body is told.
+    pub fn pairs(&self) -> impl Iterator<Item = ([&Hull; 2], Option<BodyId>)> {
+        let entry = |key: u32| &self.entries[key as usize];
+        let arrives = move |key: u32| entry(key).round == self.round;
+        let near = self.near.iter().filter(move |pair| pair.iter().all(|&key| arrives(key)));
+        let near = near.map(move |pair| (pair.map(|key| self.hull(key)), None));
+        let sleeping =
+            self.near_sleeping.iter().filter(move |&&[hull, sleeper]| arrives(hull) && entry(sleeper).sleeps());
+        let sleeping = sleeping.map(move |pair| {
+            let [a, b] = pair.map(|key| self.hull(key));
+            (if a.placed.serial < b.placed.serial { [a, b] } else { [b, a] }, Some(b.placed.body))
+        });
+        near.chain(sleeping).filter(|([a, b], _)| a.bounds.overlaps(&b.bounds))
     }
 
-    /// Hulls and pieces of static geometry whose bounds overlap, in order of serials.
+    /// Hulls of this round and pieces of static geometry whose bounds overlap, in order of serials.
     pub fn pairs_with_fixed(&self) -> impl Iterator<Item = (&Hull, StaticId)> {
-        let pairs = self.near_fixed.iter().map(|&[hull, piece]| (self.hull(hull), &self.pieces[piece as usize]));
+        let arrives = |key: u32| self.entries[key as usize].round == self.round;
+        let pairs = self.near_fixed.iter().filter(move |pair| arrives(pair[0]));
+        let pairs = pairs.map(|&[hull, piece]| (self.hull(hull), &self.pieces[piece as usize]));
         pairs.filter(|(hull, piece)| hull.bounds.overlaps(&piece.bounds)).map(|(hull, piece)| (hull, piece.id))
     }
 }

@@ -28,6 +28,7 @@ pub use interface::{
 use crate::collide::Collider;
 use crate::error::{LARGEST, SimError, require, require_rotation, require_vector};
 use crate::potential::gravity::Gravity;
+use crate::sleep::Rest;
 use crate::state::{Slice, State};
 
 slotmap::new_key_type! {
@@ -119,6 +120,10 @@ pub(crate) struct Body {
     pub is_wheel: bool,
     /// Its state became non-finite: it stays where it last was sane, outside dynamics and collision.
     pub quarantined: bool,
+    /// How still it has been.
+    pub rest: Rest,
+    /// The group that it sleeps with.
+    pub asleep: Option<u32>,
 }
 
 /// A collider on a body.

@@ -39,10 +39,10 @@ enum Spot {
 impl Integrator {
     pub(super) fn gather_bodies(&mut self, scene: &mut Scene) {
         self.active.clear();
-        for body in scene.bodies.values_mut() {
-            body.is_wheel = false;
+        for &id in scene.order {
+            scene.bodies[id].is_wheel = false;
         }
-        for axle in scene.potentials.axles.values() {
+        for (_, axle) in scene.potentials.axles.awake() {
             let carried = scene.bodies.get(axle.chassis).is_some_and(|chassis| !chassis.quarantined);
             scene.bodies[axle.wheel].is_wheel = carried;
         }
@@ -118,26 +118,26 @@ impl Integrator {
     pub(super) fn gather_potentials(&mut self, scene: &Scene) {
         self.gather_contacts(scene);
         let Settings { dt, solver, .. } = scene.settings;
-        for desc in scene.potentials.springs.values() {
+        for (_, desc) in scene.potentials.springs.awake() {
             let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
             let points = solve.places(ends);
             solve.problem.terms.springs.push(SpringTerm::new(ends, desc, points[0].distance(points[1])));
         }
-        for (id, &Held { desc, memory }) in &scene.potentials.rods {
+        for (id, &Held { desc, memory }) in scene.potentials.rods.awake() {
             let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
             let scale = solve.scale(ends, solve.places(ends), solver.joint_stiffness);
             solve.problem.terms.rods.push(RodTerm::new(ends, [desc.length; 2], desc.tolerance, scale, memory));
             solve.rods.push(id);
         }
         self.gather_own_rods(scene);
-        for (id, &Held { desc, memory }) in &scene.potentials.ball_joints {
+        for (id, &Held { desc, memory }) in scene.potentials.ball_joints.awake() {
             let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
             let scale = solve.scale(ends, solve.places(ends), solver.joint_stiffness);
             solve.problem.terms.ball_joints.push(BallJointTerm::new(ends, desc.tolerance, scale, memory));
             solve.ball_joints.push(id);
         }
         self.gather_joints(scene);
-        for desc in scene.potentials.axles.values() {
+        for (_, desc) in scene.potentials.axles.awake() {
             let anchors = [desc.chassis, desc.wheel].map(|id| Anchor::body(id, DVec3::ZERO));
             let Some((solve, ends)) = self.localise_anchors(scene, anchors) else { continue };
             let frames = ends.map(|end| end.frame);
@@ -150,7 +150,7 @@ impl Integrator {
             }
             solve.problem.terms.axles.push(term);
         }
-        for (desc, gains) in scene.potentials.pds.values() {
+        for (_, (desc, gains)) in scene.potentials.pds.awake() {
             let anchors = [desc.at, Anchor::world(DVec3::ZERO)];
             let Some((solve, [end, _])) = self.localise_anchors(scene, anchors) else { continue };
             let (mass, start) = (solve.mass(end), solve.start(end).place(end.point));

@@ -16,7 +16,7 @@ use crate::potential::{Driven, MotorDesc};
 impl Integrator {
     pub(super) fn gather_joints(&mut self, scene: &Scene) {
         let least = scene.settings.solver.joint_stiffness;
-        for (id, &Held { desc: Captured { desc, axes: [axis, _] }, memory }) in &scene.potentials.hinges {
+        for (id, &Held { desc: Captured { desc, axes: [axis, _] }, memory }) in scene.potentials.hinges.awake() {
             let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
             let scale = solve.scale(ends, solve.places(ends), least);
             let place = BallJointTerm::new(ends, desc.tolerance, scale, memory);
@@ -24,7 +24,7 @@ impl Integrator {
             solve.problem.terms.hinges.push(Aligned { place, turns });
             solve.hinges.push(id);
         }
-        for (id, &Held { desc, memory }) in &scene.potentials.universal_joints {
+        for (id, &Held { desc, memory }) in scene.potentials.universal_joints.awake() {
             let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
             let scale = solve.scale(ends, solve.places(ends), least);
             let place = BallJointTerm::new(ends, desc.tolerance, scale, memory);
@@ -33,7 +33,7 @@ impl Integrator {
             solve.problem.terms.universal_joints.push(Aligned { place, turns });
             solve.universal_joints.push(id);
         }
-        for (id, &Held { desc: Captured { desc, axes }, memory }) in &scene.potentials.fixed_joints {
+        for (id, &Held { desc: Captured { desc, axes }, memory }) in scene.potentials.fixed_joints.awake() {
             let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
             let scale = solve.scale(ends, solve.places(ends), least);
             let place = BallJointTerm::new(ends, desc.tolerance, scale, memory);
@@ -41,7 +41,7 @@ impl Integrator {
             solve.problem.terms.fixed_joints.push(Aligned { place, turns });
             solve.fixed_joints.push(id);
         }
-        for (id, &Held { desc: Captured { desc, axes }, memory }) in &scene.potentials.sliders {
+        for (id, &Held { desc: Captured { desc, axes }, memory }) in scene.potentials.sliders.awake() {
             let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
             let scale = solve.scale(ends, solve.places(ends), least);
             let place = LineTerm::new(ends, axes[0][0], desc.tolerance, scale, memory);
@@ -55,14 +55,14 @@ impl Integrator {
 
     fn gather_limits(&mut self, scene: &Scene) {
         let least = scene.settings.solver.joint_stiffness;
-        for (id, &Held { desc, memory }) in &scene.potentials.distance_limits {
+        for (id, &Held { desc, memory }) in scene.potentials.distance_limits.awake() {
             let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
             let scale = solve.scale(ends, solve.places(ends), least);
             let term = RodTerm::new(ends, [desc.at_least, desc.at_most], desc.tolerance, scale, memory);
             solve.problem.terms.distance_limits.push(term);
             solve.distance_limits.push(id);
         }
-        for (id, &Held { desc, memory }) in &scene.potentials.angle_limits {
+        for (id, &Held { desc, memory }) in scene.potentials.angle_limits.awake() {
             let Captured { desc: hinge, axes } = scene.potentials.hinges[desc.hinge].desc;
             let Some((solve, ends)) = self.localise_anchors(scene, [hinge.a, hinge.b]) else { continue };
             let frames = ends.map(|end| end.frame);
@@ -73,7 +73,7 @@ impl Integrator {
     }
 
     fn gather_motors(&mut self, scene: &Scene) {
-        for &MotorDesc { joint, motor } in scene.potentials.motors.values() {
+        for (_, &MotorDesc { joint, motor }) in scene.potentials.motors.awake() {
             let (anchors, axis) = match joint {
                 Driven::Hinge(id) => {
                     let Captured { desc, axes } = scene.potentials.hinges[id].desc;

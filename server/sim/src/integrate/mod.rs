@@ -61,6 +61,10 @@ pub struct StepReport {
     /// Joints, rods and limits whose gap or tilt is above their tolerance at the end of the tick: overloaded beyond what stiffness can
     /// hold, torn by an impact, or lengths that cannot agree.
     pub open_joints: usize,
+    /// Pairs that the fine phase of collision detection looked at.
+    pub pairs: usize,
+    /// Bodies that sleep after the tick.
+    pub asleep: usize,
     /// Bodies that were quarantined in this tick because their state became non-finite.
     pub quarantined: usize,
 }

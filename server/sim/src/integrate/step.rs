@@ -29,7 +29,7 @@ pub(crate) struct Scene<'a> {
     pub settings: &'a Settings,
     pub state: &'a mut State,
     pub bodies: &'a mut SlotMap<BodyId, Body>,
-    /// All bodies, in order of serial.
+    /// All bodies that are awake, in order of serial.
     pub order: &'a [BodyId],
     /// All colliders of bodies, in order of serial.
     pub placed: &'a [Placed],
@@ -104,6 +104,22 @@ impl Integrator {
         let mut report = StepReport { bodies: self.active.len(), ..StepReport::default() };
         self.sum_up(&mut report);
         report
+    }
+
+    /// Number of islands of the last tick.
+    pub fn islands(&self) -> usize {
+        self.islands.len()
+    }
+
+    /// Island of the body that had this index in the last tick; [`Islands::FREE`] where nothing acted on it.
+    pub fn island_of(&self, index: u32) -> u32 {
+        self.islands.island_of(index)
+    }
+
+    /// Bodies of an island of the last tick; none for [`Islands::FREE`].
+    pub fn members(&self, island: u32) -> impl Iterator<Item = BodyId> {
+        let members = if island == Islands::FREE { &[] } else { self.islands.members(island as usize) };
+        members.iter().map(|&member| self.active[member as usize].id)
     }
 
     fn gather(&mut self, scene: &mut Scene) {

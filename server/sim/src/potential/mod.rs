@@ -16,6 +16,7 @@ pub(crate) mod hold;
 pub(crate) mod limit;
 pub(crate) mod motor;
 pub(crate) mod pd;
+mod pool;
 pub(crate) mod restitution;
 pub(crate) mod rod;
 pub(crate) mod slider;
@@ -27,7 +28,6 @@ pub(crate) mod universal_joint;
 use std::ops::AddAssign;
 
 use glam::{DMat3, DVec3};
-use slotmap::SlotMap;
 
 use alignment::Captured;
 pub use axle::{AxleControl, AxleDesc, AxleId, Motor};
@@ -39,6 +39,7 @@ pub use limit::{AngleLimitDesc, AngleLimitId, DistanceLimitDesc, DistanceLimitId
 pub use motor::{Driven, MotorDesc, MotorId};
 pub(crate) use pd::PdGains;
 pub use pd::{PdControl, PdDesc, PdId};
+use pool::Pool;
 pub use rod::{RodDesc, RodId};
 pub use slider::{SliderDesc, SliderId};
 pub use spring::{SpringDesc, SpringId};
@@ -79,37 +80,65 @@ impl Anchor {
 /// The world's potentials, apart from contacts, which live for one tick.
 #[derive(Default)]
 pub(crate) struct Potentials {
-    pub springs: SlotMap<SpringId, SpringDesc>,
-    pub rods: SlotMap<RodId, Held<RodDesc>>,
-    pub ball_joints: SlotMap<BallJointId, Held<BallJointDesc>>,
+    pub springs: Pool<SpringId, SpringDesc>,
+    pub rods: Pool<RodId, Held<RodDesc>>,
+    pub ball_joints: Pool<BallJointId, Held<BallJointDesc>>,
     /// With the axis and the direction of angle 0.
-    pub hinges: SlotMap<HingeId, Held<Captured<HingeDesc, 2>>>,
-    pub universal_joints: SlotMap<UniversalJointId, Held<UniversalJointDesc>>,
-    pub fixed_joints: SlotMap<FixedJointId, Held<Captured<FixedJointDesc, 3>>>,
-    pub sliders: SlotMap<SliderId, Held<Captured<SliderDesc, 3>>>,
-    pub distance_limits: SlotMap<DistanceLimitId, Held<DistanceLimitDesc>>,
-    pub angle_limits: SlotMap<AngleLimitId, Held<AngleLimitDesc>>,
-    pub motors: SlotMap<MotorId, MotorDesc>,
-    pub axles: SlotMap<AxleId, AxleDesc>,
-    pub pds: SlotMap<PdId, (PdDesc, PdGains)>,
+    pub hinges: Pool<HingeId, Held<Captured<HingeDesc, 2>>>,
+    pub universal_joints: Pool<UniversalJointId, Held<UniversalJointDesc>>,
+    pub fixed_joints: Pool<FixedJointId, Held<Captured<FixedJointDesc, 3>>>,
+    pub sliders: Pool<SliderId, Held<Captured<SliderDesc, 3>>>,
+    pub distance_limits: Pool<DistanceLimitId, Held<DistanceLimitDesc>>,
+    pub angle_limits: Pool<AngleLimitId, Held<AngleLimitDesc>>,
+    pub motors: Pool<MotorId, MotorDesc>,
+    pub axles: Pool<AxleId, AxleDesc>,
+    pub pds: Pool<PdId, (PdDesc, PdGains)>,
 }
 
 impl Potentials {
-    /// Both ends of every potential; angle limits and motors share those of their joint.
+    /// Both ends of every potential that takes part; angle limits and motors share those of their joint.
     pub fn pairs(&self) -> impl Iterator<Item = [Anchor; 2]> + '_ {
-        let centre = |body: BodyId| Anchor::body(body, DVec3::ZERO);
-        let springs = self.springs.values().map(|s| [s.a, s.b]);
-        let rods = self.rods.values().map(|r| [r.desc.a, r.desc.b]);
-        let ball_joints = self.ball_joints.values().map(|j| [j.desc.a, j.desc.b]);
-        let hinges = self.hinges.values().map(|h| [h.desc.desc.a, h.desc.desc.b]);
-        let universal_joints = self.universal_joints.values().map(|j| [j.desc.a, j.desc.b]);
-        let fixed_joints = self.fixed_joints.values().map(|j| [j.desc.desc.a, j.desc.desc.b]);
-        let sliders = self.sliders.values().map(|s| [s.desc.desc.a, s.desc.desc.b]);
-        let limits = self.distance_limits.values().map(|l| [l.desc.a, l.desc.b]);
-        let axles = self.axles.values().map(move |a| [centre(a.chassis), centre(a.wheel)]);
-        let pds = self.pds.values().map(|(pd, _)| [pd.at, Anchor::world(DVec3::ZERO)]);
+        let springs = self.springs.awake().map(|(_, s)| [s.a, s.b]);
+        let rods = self.rods.awake().map(|(_, r)| [r.desc.a, r.desc.b]);
+        let ball_joints = self.ball_joints.awake().map(|(_, j)| [j.desc.a, j.desc.b]);
+        let hinges = self.hinges.awake().map(|(_, h)| [h.desc.desc.a, h.desc.desc.b]);
+        let universal_joints = self.universal_joints.awake().map(|(_, j)| [j.desc.a, j.desc.b]);
+        let fixed_joints = self.fixed_joints.awake().map(|(_, j)| [j.desc.desc.a, j.desc.desc.b]);
+        let sliders = self.sliders.awake().map(|(_, s)| [s.desc.desc.a, s.desc.desc.b]);
+        let limits = self.distance_limits.awake().map(|(_, l)| [l.desc.a, l.desc.b]);
+        let axles = self.axles.awake().map(|(_, a)| [a.chassis, a.wheel].map(|id| Anchor::body(id, DVec3::ZERO)));
+        let pds = self.pds.awake().map(|(_, (pd, _))| [pd.at, Anchor::world(DVec3::ZERO)]);
         let joints = ball_joints.chain(hinges).chain(universal_joints).chain(fixed_joints).chain(sliders);
         springs.chain(rods).chain(joints).chain(limits).chain(axles).chain(pds)
+    }
+
+    /// From now on those take part of which a body is awake.
+    pub fn sort(&mut self, is_awake: impl Fn(BodyId) -> bool) {
+        let any = |a: Anchor, b: Anchor| [a, b].into_iter().filter_map(|end| end.body).any(&is_awake);
+        self.springs.sort(|s| any(s.a, s.b));
+        self.rods.sort(|r| any(r.desc.a, r.desc.b));
+        self.ball_joints.sort(|j| any(j.desc.a, j.desc.b));
+        self.hinges.sort(|h| any(h.desc.desc.a, h.desc.desc.b));
+        self.universal_joints.sort(|j| any(j.desc.a, j.desc.b));
+        self.fixed_joints.sort(|j| any(j.desc.desc.a, j.desc.desc.b));
+        self.sliders.sort(|s| any(s.desc.desc.a, s.desc.desc.b));
+        self.distance_limits.sort(|l| any(l.desc.a, l.desc.b));
+        self.axles.sort(|a| is_awake(a.chassis) || is_awake(a.wheel));
+        self.pds.sort(|(pd, _)| any(pd.at, pd.at));
+        let Self { hinges, sliders, angle_limits, motors, .. } = self;
+        angle_limits.sort(|l| hinges.get(l.desc.hinge).is_some_and(|h| any(h.desc.desc.a, h.desc.desc.b)));
+        motors.sort(|m| match m.joint {
+            Driven::Hinge(id) => hinges.get(id).is_some_and(|h| any(h.desc.desc.a, h.desc.desc.b)),
+            Driven::Slider(id) => sliders.get(id).is_some_and(|s| any(s.desc.desc.a, s.desc.desc.b)),
+        });
+    }
+
+    /// Both ends of what a motor drives.
+    pub fn ends_of(&self, joint: Driven) -> Option<[Anchor; 2]> {
+        match joint {
+            Driven::Hinge(id) => self.hinges.get(id).map(|h| [h.desc.desc.a, h.desc.desc.b]),
+            Driven::Slider(id) => self.sliders.get(id).map(|s| [s.desc.desc.a, s.desc.desc.b]),
+        }
     }
 
     /// Removes every potential of a body.

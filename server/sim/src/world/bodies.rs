@@ -9,6 +9,7 @@ use crate::dof::{
     Twist, particle, rigid_body,
 };
 use crate::error::SimError;
+use crate::sleep::Rest;
 
 impl World {
     /// Adds a rigid body.
@@ -62,9 +63,11 @@ impl World {
 
     /// Removes a body with every potential and contact that it has. Answers whether there was one.
     pub fn remove_body(&mut self, id: BodyId) -> bool {
+        self.rouse(id);
         let Some(body) = self.bodies.remove(id) else { return false };
         self.state.free(body.slice);
         self.order.retain(|&other| other != id);
+        self.awake.retain(|&other| other != id);
         self.potentials.remove_body(id);
         self.detector.forget_exclusions(body.serial);
         let Self { placed, detector, .. } = self;
@@ -84,7 +87,7 @@ impl World {
         let (slice, serial) = (self.state.allocate(size.0, size.1), self.serials);
         self.serials += 1;
         let (force, torque, impulse, index) = (DVec3::ZERO, DVec3::ZERO, Twist::REST, ABSENT);
-        let (is_wheel, quarantined) = (false, false);
+        let (is_wheel, quarantined, rest, asleep) = (false, false, Rest::new(size.1), None);
         let (has_collider, figure) = (collider.is_some(), None);
         let id = self.bodies.insert(Body {
             kind,
@@ -100,8 +103,11 @@ impl World {
             index,
             is_wheel,
             quarantined,
+            rest,
+            asleep,
         });
         self.order.push(id);
+        self.awake.push(id);
         if has_collider {
             let at = PartPoint { part: 0, point: DVec3::ZERO };
             self.place(Placed { serial, body: id, at, index: 0, hull: ABSENT });
@@ -120,11 +126,23 @@ impl World {
     /// # Errors
     /// [`SimError`] naming the value that is out of range.
     pub fn add_static(&mut self, desc: StaticDesc) -> Result<StaticId, SimError> {
-        self.detector.add_static(desc)
+        let id = self.detector.add_static(desc)?;
+        self.rouse_around(id);
+        Ok(id)
     }
 
     /// Removes a piece of static geometry. Answers whether there was one.
     pub fn remove_static(&mut self, id: StaticId) -> bool {
+        self.rouse_around(id);
         self.detector.remove_static(id)
+    }
+
+    /// Wakes what is near a piece of static geometry.
+    fn rouse_around(&mut self, id: StaticId) {
+        let near = match self.detector.sleepers_around(id) {
+            Some(near) => near,
+            None => self.sleepers.representatives().collect(),
+        };
+        near.into_iter().for_each(|id| self.rouse(id));
     }
 }

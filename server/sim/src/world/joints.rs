@@ -87,6 +87,7 @@ impl World {
     pub fn add_distance_limit(&mut self, desc: DistanceLimitDesc) -> Result<DistanceLimitId, SimError> {
         desc.validate()?;
         self.check_anchors(desc.a, desc.b)?;
+        self.rouse_ends(desc.a, desc.b);
         Ok(self.potentials.distance_limits.insert(Held::new(desc)))
     }
 
@@ -96,9 +97,10 @@ impl World {
     /// [`SimError`] for a value out of range, or a hinge that is gone.
     pub fn add_angle_limit(&mut self, desc: AngleLimitDesc) -> Result<AngleLimitId, SimError> {
         desc.validate()?;
-        if !self.potentials.hinges.contains_key(desc.hinge) {
+        let Some([a, b]) = self.potentials.ends_of(Driven::Hinge(desc.hinge)) else {
             return Err(SimError::Gone { what: "the hinge of the limit" });
-        }
+        };
+        self.rouse_ends(a, b);
         Ok(self.potentials.angle_limits.insert(Held::new(desc)))
     }
 
@@ -108,13 +110,10 @@ impl World {
     /// [`SimError`] for a value out of range, or a joint that is gone.
     pub fn add_motor(&mut self, desc: MotorDesc) -> Result<MotorId, SimError> {
         desc.motor.validate()?;
-        let exists = match desc.joint {
-            Driven::Hinge(hinge) => self.potentials.hinges.contains_key(hinge),
-            Driven::Slider(slider) => self.potentials.sliders.contains_key(slider),
-        };
-        if !exists {
+        let Some([a, b]) = self.potentials.ends_of(desc.joint) else {
             return Err(SimError::Gone { what: "the joint of the motor" });
-        }
+        };
+        self.rouse_ends(a, b);
         Ok(self.potentials.motors.insert(desc))
     }
 
@@ -129,7 +128,11 @@ impl World {
     /// [`SimError`] for a value out of range, or a motor that is gone.
     pub fn set_motor(&mut self, id: MotorId, motor: Motor) -> Result<(), SimError> {
         motor.validate()?;
-        self.potentials.motors.get_mut(id).ok_or(SimError::Gone { what: "the motor" })?.motor = motor;
+        let desc = self.potentials.motors.get_mut(id).ok_or(SimError::Gone { what: "the motor" })?;
+        let (joint, changes) = (desc.joint, std::mem::replace(&mut desc.motor, motor) != motor);
+        if let Some([a, b]) = self.potentials.ends_of(joint).filter(|_| changes) {
+            self.rouse_ends(a, b);
+        }
         Ok(())
     }
 
@@ -171,17 +174,27 @@ impl World {
 
     /// Removes a limit of a distance. Answers whether there was one.
     pub fn remove_distance_limit(&mut self, id: DistanceLimitId) -> bool {
-        self.potentials.distance_limits.remove(id).is_some()
+        let Some(limit) = self.potentials.distance_limits.remove(id) else { return false };
+        self.rouse_ends(limit.desc.a, limit.desc.b);
+        true
     }
 
     /// Removes a limit of an angle. Answers whether there was one.
     pub fn remove_angle_limit(&mut self, id: AngleLimitId) -> bool {
-        self.potentials.angle_limits.remove(id).is_some()
+        let Some(limit) = self.potentials.angle_limits.remove(id) else { return false };
+        if let Some([a, b]) = self.potentials.ends_of(Driven::Hinge(limit.desc.hinge)) {
+            self.rouse_ends(a, b);
+        }
+        true
     }
 
     /// Removes a motor. Answers whether there was one.
     pub fn remove_motor(&mut self, id: MotorId) -> bool {
-        self.potentials.motors.remove(id).is_some()
+        let Some(motor) = self.potentials.motors.remove(id) else { return false };
+        if let Some([a, b]) = self.potentials.ends_of(motor.joint) {
+            self.rouse_ends(a, b);
+        }
+        true
     }
 
     /// What the frames of two anchors have in common now, given as directions in the first.

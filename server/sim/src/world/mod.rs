@@ -6,6 +6,7 @@ mod collisions;
 mod conserved;
 mod joints;
 mod potentials;
+mod sleep;
 mod state;
 
 use slotmap::SlotMap;
@@ -16,6 +17,7 @@ use crate::error::SimError;
 use crate::integrate::{Integrator, Scene, StepReport};
 use crate::potential::Potentials;
 use crate::settings::{Settings, SolverSettings};
+use crate::sleep::Sleepers;
 use crate::state::State;
 
 pub use conserved::{Energy, Momentum};
@@ -28,10 +30,17 @@ pub struct World {
     bodies: SlotMap<BodyId, Body>,
     /// All bodies, in order of serial.
     order: Vec<BodyId>,
+    /// Those that do not sleep, in order of serial.
+    awake: Vec<BodyId>,
     /// All colliders of bodies, in order of serial.
     placed: Vec<Placed>,
     serials: u32,
     potentials: Potentials,
+    /// Whether they know who is awake.
+    potentials_are_sorted: bool,
+    sleepers: Sleepers,
+    /// For how long each island has been still, s; kept for its memory.
+    stillness: Vec<f64>,
     detector: Detector,
     integrator: Integrator,
     report: StepReport,
@@ -51,9 +60,13 @@ impl World {
             state: State::default(),
             bodies: SlotMap::with_key(),
             order: Vec::new(),
+            awake: Vec::new(),
             placed: Vec::new(),
             serials: 0,
             potentials: Potentials::default(),
+            potentials_are_sorted: true,
+            sleepers: Sleepers::default(),
+            stillness: Vec::new(),
             detector: Detector::default(),
             integrator,
             report: StepReport::default(),
@@ -67,7 +80,17 @@ impl World {
 
     /// Stage 2: finds contacts at Q0.
     pub fn detect_collisions(&mut self) {
-        self.detector.detect(Bodies { bodies: &self.bodies, state: &self.state }, &self.settings);
+        self.detector.begin();
+        while {
+            let bodies = Bodies { bodies: &self.bodies, state: &self.state };
+            self.detector.meet(bodies, &self.settings)
+        } {
+            // What was touched in its sleep meets others in turn.
+            let mut touched = std::mem::take(&mut self.detector.touched);
+            touched.drain(..).for_each(|id| self.rouse(id));
+            self.detector.touched = touched;
+        }
+        self.detector.finish(&self.settings);
     }
 
     /// Stage 4: integrates all DOF over one tick.
@@ -76,6 +99,9 @@ impl World {
         let report = integrator.step(&mut scene);
         self.report = report;
         self.detector.remember();
+        self.report.pairs = self.detector.pairs();
+        self.settle();
+        self.report.asleep = self.sleepers.count;
         &self.report
     }
 
@@ -92,11 +118,12 @@ impl World {
     }
 
     fn scene(&mut self) -> (&mut Integrator, Scene<'_>) {
+        self.sort_potentials();
         let scene = Scene {
             settings: &self.settings,
             state: &mut self.state,
             bodies: &mut self.bodies,
-            order: &self.order,
+            order: &self.awake,
             placed: &self.placed,
             potentials: &mut self.potentials,
             contacts: &mut self.detector.contacts,

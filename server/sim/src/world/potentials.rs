@@ -19,6 +19,7 @@ impl World {
     pub fn add_spring(&mut self, desc: SpringDesc) -> Result<SpringId, SimError> {
         desc.validate()?;
         self.check_anchors(desc.a, desc.b)?;
+        self.rouse_ends(desc.a, desc.b);
         Ok(self.potentials.springs.insert(desc))
     }
 
@@ -29,6 +30,7 @@ impl World {
     pub fn add_rod(&mut self, desc: RodDesc) -> Result<RodId, SimError> {
         desc.validate()?;
         self.check_anchors(desc.a, desc.b)?;
+        self.rouse_ends(desc.a, desc.b);
         Ok(self.potentials.rods.insert(Held::new(desc)))
     }
 
@@ -55,6 +57,7 @@ impl World {
             return Err(SimError::Unusable { what: "an axle needs two different rigid bodies" });
         }
         self.detector.exclude(chassis.serial, wheel.serial);
+        [desc.chassis, desc.wheel].into_iter().for_each(|id| self.rouse(id));
         Ok(self.potentials.axles.insert(desc))
     }
 
@@ -74,17 +77,22 @@ impl World {
             return Err(SimError::Unusable { what: "a controller needs a body to move" });
         }
         self.check_anchors(desc.at, Anchor::world(DVec3::ZERO))?;
+        self.rouse_ends(desc.at, desc.at);
         Ok(self.potentials.pds.insert((desc, gains)))
     }
 
     /// Removes a spring. Answers whether there was one.
     pub fn remove_spring(&mut self, id: SpringId) -> bool {
-        self.potentials.springs.remove(id).is_some()
+        let Some(spring) = self.potentials.springs.remove(id) else { return false };
+        self.rouse_ends(spring.a, spring.b);
+        true
     }
 
     /// Removes a rod. Answers whether there was one.
     pub fn remove_rod(&mut self, id: RodId) -> bool {
-        self.potentials.rods.remove(id).is_some()
+        let Some(rod) = self.potentials.rods.remove(id) else { return false };
+        self.rouse_ends(rod.desc.a, rod.desc.b);
+        true
     }
 
     /// Removes a ball joint. Answers whether there was one.
@@ -96,7 +104,9 @@ impl World {
 
     /// Removes a controller. Answers whether there was one.
     pub fn remove_pd(&mut self, id: PdId) -> bool {
-        self.potentials.pds.remove(id).is_some()
+        let Some((pd, _)) = self.potentials.pds.remove(id) else { return false };
+        self.rouse_ends(pd.at, pd.at);
+        true
     }
 
     /// What a driver does to a wheel now.
@@ -110,7 +120,11 @@ impl World {
     /// [`SimError`] for a value out of range, or an axle that is gone.
     pub fn set_axle(&mut self, id: AxleId, control: AxleControl) -> Result<(), SimError> {
         control.validate()?;
-        self.potentials.axles.get_mut(id).ok_or(SimError::Gone { what: "the axle" })?.control = control;
+        let axle = self.potentials.axles.get_mut(id).ok_or(SimError::Gone { what: "the axle" })?;
+        if std::mem::replace(&mut axle.control, control) != control {
+            let wheel = axle.wheel;
+            self.rouse(wheel);
+        }
         Ok(())
     }
 
@@ -120,19 +134,25 @@ impl World {
     /// [`SimError`] for a value out of range, or a controller that is gone.
     pub fn set_pd(&mut self, id: PdId, control: PdControl) -> Result<(), SimError> {
         control.validate()?;
-        self.potentials.pds.get_mut(id).ok_or(SimError::Gone { what: "the controller" })?.0.control = control;
+        let (pd, _) = self.potentials.pds.get_mut(id).ok_or(SimError::Gone { what: "the controller" })?;
+        if std::mem::replace(&mut pd.control, control) != control {
+            let at = pd.at;
+            self.rouse_ends(at, at);
+        }
         Ok(())
     }
 
-    /// From now on the bodies of a joint do not collide with each other.
+    /// From now on the bodies of a joint do not collide with each other. They wake.
     pub(super) fn exclude(&mut self, a: Anchor, b: Anchor) {
+        self.rouse_ends(a, b);
         if let (Some(a), Some(b)) = (a.body, b.body) {
             self.detector.exclude(self.bodies[a].serial, self.bodies[b].serial);
         }
     }
 
-    /// Takes one [`World::exclude`] back.
+    /// Takes one [`World::exclude`] back. The bodies wake.
     pub(super) fn include(&mut self, a: Anchor, b: Anchor) {
+        self.rouse_ends(a, b);
         if let (Some(a), Some(b)) = (a.body, b.body) {
             self.detector.include(self.bodies[a].serial, self.bodies[b].serial);
         }

@@ -62,14 +62,20 @@ impl World {
     pub fn set_pose(&mut self, id: BodyId, position: DVec3, rotation: DQuat) -> Result<(), SimError> {
         require_vector(position, "position")?;
         require_rotation(rotation, "rotation")?;
-        let body = self.simple_body(id)?;
-        let body = &mut self.bodies[body];
+        let id = self.simple_body(id)?;
+        self.rouse(id);
+        let body = &mut self.bodies[id];
         body.set_pose(Pose { position, rotation: rotation.normalize() }, &mut self.state);
         body.quarantined = false;
         body.impulse = Twist::REST;
-        let serial = body.serial;
-        self.detector.forget_contacts(serial);
+        self.forget_contacts(id);
         Ok(())
+    }
+
+    /// Forgets the contacts of a body, which is awake.
+    fn forget_contacts(&mut self, id: BodyId) {
+        let serials: Vec<_> = self.colliders_of(id).iter().map(|placed| placed.serial).collect();
+        serials.into_iter().for_each(|serial| self.detector.forget_contacts(serial));
     }
 
     /// Sets velocity, m/s, and angular velocity, rad/s in world axes.
@@ -79,7 +85,9 @@ impl World {
     pub fn set_velocity(&mut self, id: BodyId, linear: DVec3, angular: DVec3) -> Result<(), SimError> {
         require_vector(linear, "velocity")?;
         require_vector(angular, "angular_velocity")?;
-        let body = &self.bodies[self.simple_body(id)?];
+        let id = self.simple_body(id)?;
+        self.rouse(id);
+        let body = &self.bodies[id];
         body.set_twist(Twist { linear, angular }, &mut self.state);
         Ok(())
     }
@@ -92,6 +100,9 @@ impl World {
         require_vector(force, "force")?;
         require_vector(at, "at")?;
         let id = self.simple_body(id)?;
+        if force != DVec3::ZERO {
+            self.rouse(id);
+        }
         let body = &mut self.bodies[id];
         let arm = at - body.pose(&self.state).position;
         body.force += force;
@@ -144,9 +155,8 @@ impl World {
         body.quarantined = false;
         self.state.q_mut(body.slice).copy_from_slice(q);
         self.state.v_mut(body.slice).copy_from_slice(v);
-        for placed in self.placed.iter().filter(|placed| placed.body == id) {
-            self.detector.forget_contacts(placed.serial);
-        }
+        self.rouse(id);
+        self.forget_contacts(id);
         Ok(())
     }
 
@@ -168,7 +178,10 @@ impl World {
             return Err(SimError::Unusable { what: "a control is NaN" });
         }
         figure.dof.check_controls(controls, self.settings.dt)?;
-        figure.controls.copy_from_slice(controls);
+        if figure.controls != controls {
+            figure.controls.copy_from_slice(controls);
+            self.rouse(id);
+        }
         Ok(())
     }
 

@@ -18,6 +18,7 @@ mod potentials;
 mod restitution;
 mod sheep;
 mod sheep_forms;
+mod sleep;
 mod solvers;
 mod tolerance;
 
@@ -31,12 +32,12 @@ fn world() -> World {
 }
 
 fn weightless() -> World {
-    World::new(Settings { gravity: DVec3::ZERO, ..Settings::at(DT) }).unwrap()
+    World::new(Settings { gravity: DVec3::ZERO, sleep: None, ..Settings::at(DT) }).unwrap()
 }
 
 /// A world whose solver leaves next to nothing: what it does is the scheme's.
 fn precise(gravity: DVec3) -> World {
-    let mut settings = Settings { gravity, ..Settings::at(DT) };
+    let mut settings = Settings { gravity, sleep: None, ..Settings::at(DT) };
     settings.solver.tolerance = 3e-9;
     settings.solver.forcing = 1e-6;
     World::new(settings).unwrap()

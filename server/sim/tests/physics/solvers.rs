@@ -5,7 +5,7 @@ use pita_sim::{Anchor, DVec3, Method, Preconditioner, Settings, SolverSettings, 
 use super::{DT, cube, ground, particle};
 
 fn world_with(solver: SolverSettings) -> World {
-    World::new(Settings { solver, ..Settings::at(DT) }).unwrap()
+    World::new(Settings { solver, sleep: None, ..Settings::at(DT) }).unwrap()
 }
 
 /// A square net of springs that hangs from two corners.
