@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use pita_protocol::{
     Message,
-    message::{JoinRequest, Role},
+    message::{JoinAccepted, JoinRequest, ResumeProof, Role},
+    seal::{SessionKey, prove},
 };
 
 use crate::{
@@ -23,6 +24,32 @@ pub struct SessionBuilder {
     pub(crate) loss_timeout: Duration,
     pub(crate) interpolation: Option<InterpolationSettings>,
     pub(crate) conditioner: Option<ConditionerSettings>,
+    resume: Option<ResumeTicket>,
+}
+
+/// What lets a session go on over another connection; see [`SessionBuilder::resume`]. A secret.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ResumeTicket {
+    arena: String,
+    slot: u16,
+    epoch: u32,
+    key: SessionKey,
+}
+
+impl ResumeTicket {
+    pub(crate) fn of(accepted: &JoinAccepted) -> Self {
+        Self {
+            arena: accepted.description.arena.clone(),
+            slot: accepted.slot,
+            epoch: accepted.epoch,
+            key: accepted.session_key.clone(),
+        }
+    }
+
+    fn proof(&self) -> ResumeProof {
+        let Self { slot, epoch, .. } = *self;
+        ResumeProof { slot, epoch, proof: prove(slot, epoch, &self.key) }
+    }
 }
 
 impl SessionBuilder {
@@ -36,6 +63,7 @@ impl SessionBuilder {
             loss_timeout: Duration::from_secs(3),
             interpolation: Some(InterpolationSettings::default()),
             conditioner: None,
+            resume: None,
         }
     }
 
@@ -70,6 +98,14 @@ impl SessionBuilder {
         self
     }
 
+    /// Goes on with an earlier session, in the same slot and car, where the server still keeps them. A ticket is good for
+    /// once: the session that comes of it has one of its own.
+    pub fn resume(mut self, ticket: ResumeTicket) -> Self {
+        self.arena = Some(ticket.arena.clone());
+        self.resume = Some(ticket);
+        self
+    }
+
     /// Makes the network worse than it is, to see what comes of it.
     pub fn conditioner(mut self, settings: Option<ConditionerSettings>) -> Self {
         self.conditioner = settings;
@@ -81,7 +117,8 @@ impl SessionBuilder {
     /// # Errors
     /// Any [`ClientError`] but [`Spectator`](ClientError::Spectator) and [`Ended`](ClientError::Ended).
     pub async fn connect(self) -> Result<Session, ClientError> {
-        let request = JoinRequest { name: self.name.clone(), role: self.role };
+        let resume = self.resume.as_ref().map(ResumeTicket::proof);
+        let request = JoinRequest { name: self.name.clone(), role: self.role, resume };
         request.validate().map_err(ClientError::BadArgument)?;
         let zenoh = transport::open(&self.endpoint, self.connect_timeout).await?;
         let joined = join(&self, &zenoh, request).await;

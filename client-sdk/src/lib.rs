@@ -33,7 +33,7 @@ mod tick_ledger;
 mod transport;
 mod wire;
 
-pub use builder::SessionBuilder;
+pub use builder::{ResumeTicket, SessionBuilder};
 pub use conditioner::{ConditionerSettings, Conditions, ConditionsError, Freeze};
 pub use error::{ClientError, SessionEnd};
 pub use events::SessionEvent;

@@ -12,7 +12,7 @@ use pita_protocol::{
 use tokio::{task::JoinHandle, time::timeout};
 
 use crate::{
-    builder::SessionBuilder,
+    builder::{ResumeTicket, SessionBuilder},
     error::{ClientError, SessionEnd},
     events::SessionEvent,
     interpolation::Frame,
@@ -90,6 +90,11 @@ impl Session {
     /// The session's own actor; `None` for a spectator.
     pub fn actor(&self) -> Option<u32> {
         self.accepted.actor
+    }
+
+    /// What lets this session go on over another connection, should this one be lost.
+    pub fn resume_ticket(&self) -> ResumeTicket {
+        ResumeTicket::of(&self.accepted)
     }
 
     /// The arena as it was at the join. Its statics never change; for its actors see [`Session::roster`].

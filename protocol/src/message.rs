@@ -10,7 +10,7 @@ pub use crate::input::{
     Controls, FATES_MAX, INPUT_FRAMES_MAX, InputAck, InputCounts, InputFate, InputFates, InputFrame, InputPacket,
     buttons,
 };
-use crate::seal::SessionKey;
+use crate::seal::{SessionKey, TAG_BYTES};
 
 /// Longest player name, bytes.
 pub const NAME_MAX: usize = 32;
@@ -35,6 +35,19 @@ pub struct JoinRequest {
     pub name: String,
     /// Player or spectator.
     pub role: Role,
+    /// The earlier session that is to go on, where it is not over yet; name and role stay what they were.
+    pub resume: Option<ResumeProof>,
+}
+
+/// Shows that whoever asks had a session.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ResumeProof {
+    /// Its slot.
+    pub slot: u16,
+    /// Its epoch. The session gets a new one, and a new key: a proof is good for once.
+    pub epoch: u32,
+    /// What [`prove`](crate::seal::prove) makes of them and the session's key.
+    pub proof: [u8; TAG_BYTES],
 }
 
 impl Message for JoinRequest {
@@ -75,6 +88,21 @@ pub enum Refusal {
         /// Number of slots of the server.
         slots: u16,
     },
+    /// Somebody with that name is there.
+    #[error("the name {name:?} is taken: choose another")]
+    NameTaken {
+        /// The name.
+        name: String,
+    },
+    /// The name is banned by whoever runs the server.
+    #[error("the name {name:?} is banned on this server")]
+    Banned {
+        /// The name.
+        name: String,
+    },
+    /// The session that was to go on is over, or another one than the proof is for.
+    #[error("the earlier session is over: join anew")]
+    Over,
     /// The server is about to end.
     #[error("the server is closing")]
     Closing,
@@ -403,6 +431,10 @@ pub struct RefusedCounts {
     pub join_full: u64,
     /// Joins of which the session ended before it was let in.
     pub join_ended: u64,
+    /// Joins under a name that is taken or banned.
+    pub join_name: u64,
+    /// Joins that were to go on with a session that is over.
+    pub join_over: u64,
     /// Inputs longer than allowed.
     pub input_too_long: u64,
     /// Inputs of another protocol version.
@@ -529,7 +561,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn join(name: &str) -> JoinRequest {
-        JoinRequest { name: name.to_owned(), role: Role::Player }
+        JoinRequest { name: name.to_owned(), role: Role::Player, resume: None }
     }
 
     fn packet(throttle: f32) -> InputPacket {

@@ -30,7 +30,7 @@ pub const TAG_BYTES: usize = 16;
 pub fn seal(packet: &InputPacket, key: &SessionKey, key_expr: &str) -> Vec<u8> {
     let mut bytes = encode(packet);
     let tag = tag(&bytes, key, key_expr);
-    bytes.extend_from_slice(&tag.as_bytes()[..TAG_BYTES]);
+    bytes.extend_from_slice(&tag);
     bytes
 }
 
@@ -45,24 +45,51 @@ pub fn open(sealed: &[u8], key: &SessionKey, key_expr: &str) -> Result<InputPack
         return Err(WireError::TooLong { bytes: sealed.len(), max });
     }
     let (body, theirs) = sealed.split_last_chunk::<TAG_BYTES>().ok_or(WireError::Malformed)?;
-    let mut padded = *tag(body, key, key_expr).as_bytes();
-    padded[TAG_BYTES..].fill(0);
-    let mut claimed = [0; 32];
-    claimed[..TAG_BYTES].copy_from_slice(theirs);
-    // Both are padded to whole hashes because their comparison is constant in time.
-    if blake3::Hash::from_bytes(padded) != blake3::Hash::from_bytes(claimed) {
+    if !same(&tag(body, key, key_expr), theirs) {
         return Err(WireError::Forged);
     }
     decode(body)
 }
 
-fn tag(body: &[u8], key: &SessionKey, key_expr: &str) -> blake3::Hash {
+fn tag(body: &[u8], key: &SessionKey, key_expr: &str) -> [u8; TAG_BYTES] {
     let mut hasher = blake3::Hasher::new_keyed(&key.0);
     // Keys of this protocol are shorter than 100 bytes.
     hasher.update(&u32::try_from(key_expr.len()).unwrap_or(u32::MAX).to_le_bytes());
     hasher.update(key_expr.as_bytes());
     hasher.update(body);
-    hasher.finalize()
+    truncated(&hasher)
+}
+
+/// Shows whoever knows `key` that the caller does, for the session of `slot` and `epoch`.
+pub fn prove(slot: u16, epoch: u32, key: &SessionKey) -> [u8; TAG_BYTES] {
+    let mut hasher = blake3::Hasher::new_keyed(&key.0);
+    // No key expression has this length: a proof is the tag of no packet.
+    hasher.update(&u32::MAX.to_le_bytes());
+    hasher.update(&slot.to_le_bytes());
+    hasher.update(&epoch.to_le_bytes());
+    truncated(&hasher)
+}
+
+fn truncated(hasher: &blake3::Hasher) -> [u8; TAG_BYTES] {
+    let mut tag = [0; TAG_BYTES];
+    tag.copy_from_slice(&hasher.finalize().as_bytes()[..TAG_BYTES]);
+    tag
+}
+
+/// Whether `claimed` is what [`prove`] answers.
+pub fn proves(claimed: &[u8; TAG_BYTES], slot: u16, epoch: u32, key: &SessionKey) -> bool {
+    same(&prove(slot, epoch, key), claimed)
+}
+
+/// Compares in constant time.
+fn same(ours: &[u8; TAG_BYTES], theirs: &[u8; TAG_BYTES]) -> bool {
+    // Both are padded to whole hashes because their comparison is constant in time.
+    let padded = |tag: &[u8; TAG_BYTES]| {
+        let mut hash = [0; 32];
+        hash[..TAG_BYTES].copy_from_slice(tag);
+        blake3::Hash::from_bytes(hash)
+    };
+    padded(ours) == padded(theirs)
 }
 
 #[cfg(test)]
@@ -90,5 +117,15 @@ mod tests {
         for length in 0..sealed.len() {
             assert!(open(&sealed[..length], &key, "pita/a/input/1").is_err(), "length {length}");
         }
+    }
+
+    #[test]
+    fn a_proof_is_for_one_session_and_key() {
+        let key = SessionKey([7; 32]);
+        let proof = prove(3, 9, &key);
+        assert!(proves(&proof, 3, 9, &key));
+        assert!(
+            !proves(&proof, 4, 9, &key) && !proves(&proof, 3, 8, &key) && !proves(&proof, 3, 9, &SessionKey([8; 32]))
+        );
     }
 }

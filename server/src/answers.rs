@@ -156,6 +156,8 @@ impl Answering {
             Refusal::Malformed(_) => counters.join_malformed.add(1),
             Refusal::Full { .. } => counters.join_full.add(1),
             Refusal::Ended { .. } => counters.join_ended.add(1),
+            Refusal::NameTaken { .. } | Refusal::Banned { .. } => counters.join_name.add(1),
+            Refusal::Over => counters.join_over.add(1),
             Refusal::Closing => {}
         }
         reply(&self.shared, query, self.shared.keys.join(), &JoinReply::Refused(refusal));
@@ -173,9 +175,16 @@ impl Answering {
         })?;
         let mut sessions = self.shared.sessions();
         let key = secrets.key.clone();
-        let joined = sessions.join(&request.name, request.role, secrets, self.shared.clock.ms());
+        let now_ms = self.shared.clock.ms();
+        let joined = match &request.resume {
+            Some(proof) => sessions.resume(proof, secrets, now_ms),
+            None => sessions.join(&request.name, request.role, secrets, now_ms),
+        };
         let id = joined.map_err(|refusal| match refusal {
             JoinRefusal::Full => Refusal::Full { slots: sessions.slots_of(request.role) },
+            JoinRefusal::NameTaken => Refusal::NameTaken { name: request.name.clone() },
+            JoinRefusal::Banned => Refusal::Banned { name: request.name.clone() },
+            JoinRefusal::Over => Refusal::Over,
             JoinRefusal::Closing => Refusal::Closing,
         })?;
         Ok((id, key))
@@ -200,7 +209,7 @@ impl Answering {
         let refusal = match reason {
             // Only players need a place in the arena.
             EndReason::NoPlace => Refusal::Full { slots: self.shared.sessions().slots_of(Role::Player) },
-            EndReason::Left | EndReason::ConnectionLost | EndReason::Silent { .. } => {
+            EndReason::Left | EndReason::ConnectionLost | EndReason::Resumed | EndReason::Silent { .. } => {
                 Refusal::Ended { reason: reason.to_string() }
             }
         };

@@ -18,6 +18,13 @@ pub enum Boarding {
         /// Name to show.
         name: String,
     },
+    /// Keeps its seat under another id; the arena is not told.
+    Resume {
+        /// The session until now.
+        from: SessionId,
+        /// The session from now on.
+        to: SessionId,
+    },
     /// Leaves it.
     Leave {
         /// Slot of the session.
@@ -58,10 +65,18 @@ impl Ledger {
         let (slot, sent) = match boarding {
             Boarding::Enter { id, .. } => (id.slot, Sent::Enter(*id)),
             Boarding::Leave { slot, .. } => (*slot, Sent::Leave),
+            Boarding::Resume { .. } => return,
         };
         if let Some(open) = self.slots.get_mut(usize::from(slot)) {
             open.push_back(sent);
         }
+    }
+
+    /// The session `from` is `to` now. Answers whether its way in is still open.
+    pub fn resumed(&mut self, from: SessionId, to: SessionId) -> bool {
+        let open = self.slots.get_mut(usize::from(from.slot)).into_iter().flatten();
+        let entering = open.filter(|sent| **sent == Sent::Enter(from));
+        entering.map(|sent| *sent = Sent::Enter(to)).count() > 0
     }
 
     /// The arena says that the player of `slot` is in: which session that is.
@@ -113,6 +128,14 @@ mod tests {
         assert_eq!(ledger.out(1), Out::Left);
         assert_eq!(ledger.entered(1), Some(B));
         assert_eq!(ledger.entered(1), None, "nothing more was sent");
+    }
+
+    #[test]
+    fn a_resumed_session_is_answered_under_its_new_name() {
+        let mut ledger = ledger(&[Sent::Enter(A)]);
+        assert!(ledger.resumed(A, B));
+        assert_eq!(ledger.entered(1), Some(B));
+        assert!(!ledger.resumed(B, A), "it is in");
     }
 
     #[test]

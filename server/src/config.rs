@@ -29,6 +29,8 @@ pub struct ServerConfig {
     pub tick: Tick,
     /// Slots and timeouts.
     pub sessions: SessionLimits,
+    /// Who stays out.
+    pub bans: Bans,
     /// What is said on stdout.
     pub report: Report,
 }
@@ -91,10 +93,20 @@ pub struct SessionLimits {
     pub spectators_max: Within<0, 1024>,
     /// A player without input for so long is put out, ms.
     pub input_timeout_ms: Within<500, 600_000>,
+    /// A player whose connection is lost keeps slot and car for so long, ms.
+    pub resume_grace_ms: Within<0, 600_000>,
     /// After so long without input the controls are let go, ms.
     pub coast_after_ms: Within<50, 60_000>,
     /// Inputs of one session that are looked at between two ticks.
     pub inputs_per_tick_max: Within<8, 1000>,
+}
+
+/// `[bans]`
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bans {
+    /// Names that are refused.
+    pub names: Vec<String>,
 }
 
 /// `[report]`

@@ -136,12 +136,16 @@ fn share(config: &ServerConfig, arena: &Arena, clock: Clock) -> Result<Shared, D
         tick_hz: config.tick.tick_hz.hz(),
         input_timeout_ms: limits.input_timeout_ms.get(),
         inputs_max: (usize::from(players) * inputs as usize).clamp(1, INPUTS_MAX),
-        sessions: Sessions::new(Limits {
-            players,
-            spectators: limits.spectators_max.get() as u16,
-            input_timeout_ms: limits.input_timeout_ms.get().into(),
-            inputs_per_tick: inputs,
-        }),
+        sessions: Sessions::new(
+            Limits {
+                players,
+                spectators: limits.spectators_max.get() as u16,
+                input_timeout_ms: limits.input_timeout_ms.get().into(),
+                resume_grace_ms: limits.resume_grace_ms.get().into(),
+                inputs_per_tick: inputs,
+            },
+            &config.bans.names,
+        ),
         description: description::describe(arena),
     }))
 }

@@ -71,6 +71,14 @@ impl Drivers {
         }
     }
 
+    /// The player of `from` drives on as `to`, whose inputs count from 1 again.
+    pub fn resume(&mut self, from: SessionId, to: SessionId, tick: u64) {
+        let is_seated = |seat: &&mut Seat| seat.epoch == from.epoch;
+        if self.seats.get_mut(usize::from(from.slot)).and_then(Option::as_mut).as_ref().is_some_and(is_seated) {
+            self.enter(to, tick);
+        }
+    }
+
     /// The seat is free again.
     pub fn leave(&mut self, slot: u16) {
         if let Some(seat) = self.seats.get_mut(usize::from(slot)) {

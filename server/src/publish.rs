@@ -92,6 +92,7 @@ impl Publishing {
             for change in changes.drain(..) {
                 match change {
                     Change::Began { id, role, name } => self.begin_session(id, role, name),
+                    Change::Resumed { from, to } => self.resume_session(from, to),
                     Change::Ended { id, role, reason } => self.end_session(id, role, reason),
                 }
             }
@@ -117,6 +118,21 @@ impl Publishing {
                 self.publish_event(Event::Joined { slot: id.slot, name });
                 self.admit(id);
             }
+        }
+    }
+
+    /// The arena notices nothing: the car is there, or on its way.
+    fn resume_session(&mut self, from: SessionId, to: SessionId) {
+        if let Some((id, _)) = self.outlets.get_mut(&to.slot) {
+            *id = to;
+        }
+        // Whoever still waits for the earlier join waits for nothing.
+        self.asker.tell(Work::Ended(from, EndReason::Resumed));
+        tracing::info!("slot {}: resumed", to.slot);
+        let is_in = !self.ledger.resumed(from, to);
+        self.boarding.push_back(Boarding::Resume { from, to });
+        if is_in {
+            self.admit(to);
         }
     }
 

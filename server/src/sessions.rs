@@ -3,9 +3,13 @@
 //! A pure state machine. Times come in as milliseconds of a monotonic clock, secrets come in from outside; it knows no
 //! network and no thread. What happens is queued as [`Change`]s, and a slot is given away again only after the
 //! [`Change::Ended`] of its last session was taken: that bounds the queue and keeps the order of a slot's sessions.
+//!
+//! A player whose connection is lost keeps slot and car for a grace time. Within it the session goes on: the connection
+//! comes back and shows its token or sends an input, or whoever proves to know the session's key resumes it over another
+//! one, with a new epoch and key.
 
-use pita_protocol::message::{InputFrame, InputPacket, Role};
-use pita_protocol::seal::SessionKey;
+use pita_protocol::message::{InputFrame, InputPacket, ResumeProof, Role};
+use pita_protocol::seal::{self, SessionKey};
 
 /// Limits of the state machine. Both kinds of slots together are at most `u16::MAX`.
 #[derive(Clone, Copy, Debug)]
@@ -16,6 +20,8 @@ pub struct Limits {
     pub spectators: u16,
     /// Silence after which a session ends, ms.
     pub input_timeout_ms: u64,
+    /// For so long a player may be without a connection, ms.
+    pub resume_grace_ms: u64,
     /// Inputs that are looked at between two ticks; a packet without a new one counts as one.
     pub inputs_per_tick: u32,
 }
@@ -47,6 +53,8 @@ pub enum EndReason {
     ConnectionLost,
     /// The arena had no place for it.
     NoPlace,
+    /// It goes on over another connection.
+    Resumed,
     /// Nothing was heard of it for the time given, ms.
     Silent {
         /// The timeout.
@@ -59,6 +67,7 @@ impl std::fmt::Display for EndReason {
         match self {
             Self::Left => f.write_str("left"),
             Self::ConnectionLost => f.write_str("connection lost"),
+            Self::Resumed => f.write_str("resumed over another connection"),
             Self::NoPlace => f.write_str("no place in the arena"),
             Self::Silent { timeout_ms } => write!(f, "no input for {} s", *timeout_ms as f64 / 1000.0),
         }
@@ -76,6 +85,13 @@ pub enum Change {
         role: Role,
         /// Its name.
         name: String,
+    },
+    /// A player's session goes on under another id.
+    Resumed {
+        /// What it was until now.
+        from: SessionId,
+        /// What it is from now on; the slot is the same.
+        to: SessionId,
     },
     /// A session ended.
     Ended {
@@ -111,6 +127,8 @@ pub enum InputRefusal {
 /// All slots.
 pub struct Sessions {
     limits: Limits,
+    /// As [`folded`].
+    banned: Vec<String>,
     slots: Vec<Slot>,
     closing: bool,
     changes: Vec<Change>,
@@ -127,7 +145,11 @@ struct Session {
     epoch: u32,
     key: SessionKey,
     role: Role,
+    /// As [`folded`].
+    name: String,
     heard_ms: u64,
+    /// Since when it has no connection.
+    away_since_ms: Option<u64>,
     last_sequence: u32,
     inputs_tick: u64,
     inputs: u32,
@@ -138,15 +160,22 @@ struct Session {
 pub enum JoinRefusal {
     /// Every slot of the role is taken.
     Full,
+    /// Somebody has that name.
+    NameTaken,
+    /// The name is on the ban list.
+    Banned,
+    /// There is no such session any more, or the proof is none.
+    Over,
     /// The server ends.
     Closing,
 }
 
 impl Sessions {
-    /// Empty slots.
-    pub fn new(limits: Limits) -> Self {
+    /// Empty slots; nobody gets in under one of the `banned` names.
+    pub fn new(limits: Limits, banned: &[String]) -> Self {
         let slots = (0..limits.players + limits.spectators).map(|_| Slot::Free).collect();
-        Self { limits, slots, closing: false, changes: Vec::new() }
+        let banned = banned.iter().map(|name| folded(name)).collect();
+        Self { limits, banned, slots, closing: false, changes: Vec::new() }
     }
 
     /// Begins a session on the lowest free slot of its role.
@@ -156,6 +185,13 @@ impl Sessions {
     pub fn join(&mut self, name: &str, role: Role, secrets: Secrets, now_ms: u64) -> Result<SessionId, JoinRefusal> {
         if self.closing {
             return Err(JoinRefusal::Closing);
+        }
+        let shown = folded(name);
+        if self.banned.contains(&shown) {
+            return Err(JoinRefusal::Banned);
+        }
+        if self.slots.iter().any(|slot| matches!(slot, Slot::Taken(session) if session.name == shown)) {
+            return Err(JoinRefusal::NameTaken);
         }
         let slots = match role {
             Role::Player => 0..self.limits.players,
@@ -168,13 +204,36 @@ impl Sessions {
             epoch: id.epoch,
             key: secrets.key,
             role,
+            name: shown,
             heard_ms: now_ms,
+            away_since_ms: None,
             last_sequence: 0,
             inputs_tick: 0,
             inputs: 0,
         });
         self.changes.push(Change::Began { id, role, name: name.to_owned() });
         Ok(id)
+    }
+
+    /// Lets a player's session go on that `proof` is for, whether its connection is known to be lost or not.
+    ///
+    /// # Errors
+    /// [`JoinRefusal::Over`], [`JoinRefusal::Closing`].
+    pub fn resume(&mut self, proof: &ResumeProof, secrets: Secrets, now_ms: u64) -> Result<SessionId, JoinRefusal> {
+        if self.closing {
+            return Err(JoinRefusal::Closing);
+        }
+        let from = SessionId { slot: proof.slot, epoch: proof.epoch };
+        let session = self.session_mut(from).ok_or(JoinRefusal::Over)?;
+        let is_proven = seal::proves(&proof.proof, proof.slot, proof.epoch, &session.key);
+        if !is_proven || session.role != Role::Player {
+            return Err(JoinRefusal::Over);
+        }
+        let to = SessionId { slot: from.slot, epoch: secrets.epoch };
+        (session.epoch, session.key) = (to.epoch, secrets.key);
+        (session.heard_ms, session.away_since_ms, session.last_sequence) = (now_ms, None, 0);
+        self.changes.push(Change::Resumed { from, to });
+        Ok(to)
     }
 
     /// Key of the session that holds `slot`.
@@ -214,13 +273,24 @@ impl Sessions {
         }
         let newest = fresh.last().ok_or(InputRefusal::Stale)?;
         session.last_sequence = newest.sequence;
-        session.heard_ms = now_ms;
+        (session.heard_ms, session.away_since_ms) = (now_ms, None);
         Ok(Received::Inputs(fresh))
     }
 
-    /// The session's liveliness token is gone: ends it.
-    pub fn token_disappeared(&mut self, id: SessionId) {
-        self.end(id, EndReason::ConnectionLost);
+    /// The session's liveliness token is there, perhaps again.
+    pub fn token_appeared(&mut self, id: SessionId, now_ms: u64) {
+        if let Some(session) = self.session_mut(id) {
+            (session.heard_ms, session.away_since_ms) = (now_ms, None);
+        }
+    }
+
+    /// The session's liveliness token is gone: the grace time of a player begins, a spectator's session ends.
+    pub fn token_disappeared(&mut self, id: SessionId, now_ms: u64) {
+        let has_grace = self.limits.resume_grace_ms > 0;
+        match self.session_mut(id) {
+            Some(session) if session.role == Role::Player && has_grace => session.away_since_ms = Some(now_ms),
+            _ => self.end(id, EndReason::ConnectionLost),
+        }
     }
 
     /// The arena refused the player: ends the session.
@@ -228,13 +298,18 @@ impl Sessions {
         self.end(id, EndReason::NoPlace);
     }
 
-    /// Ends sessions of which nothing was heard; spectators send inputs too, which drive nothing.
+    /// Ends sessions whose grace time is over or of which nothing was heard; spectators send inputs too, which drive nothing.
     pub fn expire(&mut self, now_ms: u64) {
-        let timeout_ms = self.limits.input_timeout_ms;
+        let Limits { input_timeout_ms: timeout_ms, resume_grace_ms: grace_ms, .. } = self.limits;
         for slot in 0..self.slots() {
             let Slot::Taken(session) = &self.slots[usize::from(slot)] else { continue };
-            if now_ms.saturating_sub(session.heard_ms) > timeout_ms {
-                self.end(SessionId { slot, epoch: session.epoch }, EndReason::Silent { timeout_ms });
+            let id = SessionId { slot, epoch: session.epoch };
+            match session.away_since_ms {
+                Some(since_ms) if now_ms.saturating_sub(since_ms) > grace_ms => self.end(id, EndReason::ConnectionLost),
+                None if now_ms.saturating_sub(session.heard_ms) > timeout_ms => {
+                    self.end(id, EndReason::Silent { timeout_ms });
+                }
+                _ => {}
             }
         }
     }
@@ -254,9 +329,10 @@ impl Sessions {
         }
     }
 
-    /// Sessions now.
+    /// Sessions that have a connection now.
     pub fn count(&self) -> usize {
-        self.slots.iter().filter(|slot| matches!(slot, Slot::Taken(_))).count()
+        let is_here = |slot: &&Slot| matches!(slot, Slot::Taken(session) if session.away_since_ms.is_none());
+        self.slots.iter().filter(is_here).count()
     }
 
     /// Slots for `role`.
@@ -285,6 +361,11 @@ impl Sessions {
         self.slots[usize::from(id.slot)] = Slot::Ended;
         self.changes.push(Change::Ended { id, role, reason });
     }
+}
+
+/// A name as it is compared: two that a person would take for one are one.
+fn folded(name: &str) -> String {
+    name.trim().to_lowercase()
 }
 
 #[cfg(test)]

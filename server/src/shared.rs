@@ -77,6 +77,7 @@ pub struct Start {
 impl Shared {
     /// Before the first tick, without sessions.
     pub fn new(start: Start) -> Self {
+        // A session of each slot begins, goes on or ends.
         let boarding = ArrayQueue::new(2 * usize::from(start.sessions.slots()).max(1));
         Self {
             keys: start.keys,

@@ -124,6 +124,7 @@ impl Outside {
                     self.drivers.enter(id, tick);
                     into.push(Command::Enter { slot: id.slot, name });
                 }
+                Some(Boarding::Resume { from, to }) => self.drivers.resume(from, to, tick),
                 Some(Boarding::Leave { slot, reason }) => {
                     self.drivers.leave(slot);
                     into.push(Command::Leave { slot, reason });

@@ -28,6 +28,8 @@ pub struct FleetSettings {
     pub arena: Option<String>,
     /// Dealt out in turn; all wander where it is empty.
     pub scripts: Vec<ScriptKind>,
+    /// Part of all names: those of another fleet are others, whatever its seed.
+    pub tag: u16,
     /// Bot `n` draws from a seed that follows from this and `n`.
     pub seed: u64,
     /// As [`SessionBuilder::connect_timeout`](crate::SessionBuilder::connect_timeout).
@@ -45,6 +47,7 @@ impl FleetSettings {
             endpoint: endpoint.to_owned(),
             arena: None,
             scripts: vec![ScriptKind::Wander],
+            tag: rand::random(),
             seed: 1,
             connect_timeout: Duration::from_secs(5),
             loss_timeout: Duration::from_secs(3),
@@ -168,7 +171,7 @@ impl BotFleet {
 }
 
 async fn connect(settings: FleetSettings, number: usize) -> Result<(usize, Session), ClientError> {
-    let name = format!("{}-{number}", settings.script_of(number).name());
+    let name = format!("{}-{number}-{:04x}", settings.script_of(number).name(), settings.tag);
     let builder = Session::builder(&settings.endpoint, &name);
     let builder = match &settings.arena {
         Some(arena) => builder.arena(arena),

@@ -10,12 +10,12 @@ use pita_client::ClientError;
 use pita_client::bots::{BotFleet, FleetSettings, ScriptKind};
 use pita_protocol::{
     encode,
-    message::{InputAck, JoinReply, Refusal, Role, Snapshot},
+    message::{JoinReply, Refusal, Role, Snapshot},
 };
 
 use crate::{
     SOON,
-    fake_server::{self, EPOCH, EVENTS_BEFORE, FakeServer, SLOT},
+    fake_server::{self, EPOCH, EVENTS_BEFORE, FakeServer, SLOT, ack},
     soon,
 };
 
@@ -41,7 +41,7 @@ pub fn run_world(server: Arc<FakeServer>, slots: u16, step: f32) -> tokio::task:
             ticks.tick().await;
             for slot in SLOT..SLOT + slots {
                 let dof = fake_server::car(10 * u32::from(slot), (tick - 100) as f32 * step);
-                let ack = InputAck { sequence: (tick - 101) as u32, tick, ..InputAck::default() };
+                let ack = ack((tick - 101) as u32, tick);
                 let snapshot = Snapshot { epoch: EPOCH, tick, ack, event_sequence: EVENTS_BEFORE, dof };
                 let key = format!("pita/{}/snapshot/{slot}", fake_server::ARENA);
                 fake_server::put(&server.zenoh, key, encode(&snapshot)).await;

@@ -13,8 +13,8 @@ use pita_client::{ActorDescription, Description, Event};
 use pita_protocol::{
     Keys, encode,
     message::{
-        EventMessage, InputAck, InputPacket, JoinAccepted, JoinReply, JoinRequest, PartDescription, Role, Shape,
-        Snapshot, Status,
+        EventMessage, FATES_MAX, InputAck, InputFate, InputPacket, JoinAccepted, JoinReply, JoinRequest,
+        PartDescription, Role, Shape, Snapshot, Status,
     },
     seal::{SessionKey, open},
     slices::{KIND_RIGID_BODY, pack},
@@ -201,6 +201,13 @@ pub fn accept(slot: u16, role: Role) -> Vec<u8> {
         actor,
         description: description(EVENTS_BEFORE, &[u32::from(slot)]),
     })))
+}
+
+/// All inputs up to `sequence` were applied in time, the last at `tick`.
+pub fn ack(sequence: u32, tick: u64) -> InputAck {
+    let mut ack = InputAck { sequence, tick, ..InputAck::default() };
+    (0..FATES_MAX).for_each(|behind| ack.fates.set(behind, InputFate::Applied { late_ticks: 0 }));
+    ack
 }
 
 pub fn description(event_sequence: u32, actors: &[u32]) -> Description {

@@ -3,11 +3,11 @@
 use std::time::{Duration, Instant};
 
 use pita_client::{Controls, InterpolationSettings};
-use pita_protocol::message::{InputAck, InputFate, Snapshot};
+use pita_protocol::message::Snapshot;
 
 use crate::{
     builder, eventually,
-    fake_server::{EPOCH, FakeServer, ROOT, snapshot},
+    fake_server::{EPOCH, FakeServer, ROOT, ack, snapshot},
     first_snapshot, player, soon,
 };
 
@@ -50,8 +50,7 @@ async fn acknowledgements_give_the_latency() {
     let packet = server.input().await;
     assert_eq!(packet.snapshot_tick, 101, "it acknowledges the newest snapshot");
     tokio::time::sleep(Duration::from_millis(50)).await;
-    let mut ack = InputAck { sequence: 3, tick: 102, ..InputAck::default() };
-    (0..3).for_each(|behind| ack.fates.set(behind, InputFate::Applied { late_ticks: 0 }));
+    let ack = ack(3, 102);
     server.put_snapshot(Snapshot { ack, ..snapshot(102) }).await;
     let counts = eventually(&session, "three latencies", |s| s.latency_us.len() == 3).await;
     assert!(counts.latency_us.min() >= 49_000, "{} µs", counts.latency_us.min());

@@ -101,9 +101,13 @@ fn declare(shared: &Arc<Shared>, session: &zenoh::Session, asker: &Asker) -> zen
 
 fn token_changed(shared: &Shared, key: &str, kind: SampleKind) {
     let Some((slot, epoch)) = shared.keys.session_of_live(key) else { return };
-    if kind == SampleKind::Delete {
-        shared.sessions().token_disappeared(SessionId { slot, epoch });
-        shared.wake_publisher();
+    let (id, now_ms) = (SessionId { slot, epoch }, shared.clock.ms());
+    match kind {
+        SampleKind::Put => shared.sessions().token_appeared(id, now_ms),
+        SampleKind::Delete => {
+            shared.sessions().token_disappeared(id, now_ms);
+            shared.wake_publisher();
+        }
     }
 }
 

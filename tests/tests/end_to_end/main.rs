@@ -11,6 +11,7 @@ mod frozen;
 mod leaving;
 mod programs;
 mod refusals;
+mod resuming;
 mod run;
 
 use std::future::Future;

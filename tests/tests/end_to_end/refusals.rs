@@ -13,13 +13,13 @@ use crate::{SOON, await_clients, eventually, start_patient_server};
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn joins_that_cannot_be_are_refused_in_words_and_counted() {
     let (server, observer) = start_patient_server().await;
-    let request = encode(&JoinRequest { name: "mallory".into(), role: Role::Player });
+    let request = encode(&JoinRequest { name: "mallory".into(), role: Role::Player, resume: None });
     let mut other_version = request.clone();
     other_version[0] += 1;
     let reply = join(&observer, other_version).await;
     assert!(matches!(reply, JoinReply::Refused(Refusal::Version { server: 1, client: 2 })), "{reply:?}");
 
-    let nameless = encode(&JoinRequest { name: "\n".into(), role: Role::Player });
+    let nameless = encode(&JoinRequest { name: "\n".into(), role: Role::Player, resume: None });
     let malformed = [Vec::new(), vec![1, 1, 255, 255], request[..4].to_vec(), vec![1; 5000], nameless];
     let malformed_count = malformed.len() as u64;
     for bytes in malformed {
@@ -102,7 +102,7 @@ struct Mallory<'a> {
 
 impl<'a> Mallory<'a> {
     async fn join(observer: &'a Observer) -> Self {
-        let request = encode(&JoinRequest { name: "mallory".into(), role: Role::Player });
+        let request = encode(&JoinRequest { name: "mallory".into(), role: Role::Player, resume: None });
         match join(observer, request).await {
             JoinReply::Accepted(joined) => Self { observer, joined: *joined },
             JoinReply::Refused(refusal) => panic!("{refusal}"),
