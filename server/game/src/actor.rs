@@ -5,6 +5,7 @@
 
 use pita_sim::{BodyId, DVec3, Phase, Shape, SimError, StaticId, World};
 
+use crate::rehearsal::Memory;
 use crate::{Controls, Pose};
 
 /// Description of an actor, for the wire and for people.
@@ -104,6 +105,14 @@ pub trait Actor: Send {
 
     /// Its bodies, in the order of [`ActorInfo::parts`]; never empty.
     fn bodies(&self) -> &[BodyId];
+
+    /// What it knows from tick to tick beside its bodies' states, for whoever sets them to what they were.
+    fn memory(&self) -> Memory {
+        Memory::default()
+    }
+
+    /// Remembers what [`Actor::memory`] answered then.
+    fn recall(&mut self, _memory: &Memory) {}
 
     /// Input mapping, stage 1: the newest controls of the player whose slot it has.
     fn control(&mut self, _controls: Controls) {}

@@ -6,6 +6,7 @@
 mod build;
 mod collisions;
 mod players;
+mod rehearsed;
 
 use std::collections::BTreeMap;
 

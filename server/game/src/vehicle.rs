@@ -13,6 +13,7 @@ use pita_sim::{AxleControl, BodyId, Motor, SimError, World};
 
 use crate::actor::{Actor, ActorInfo, Step};
 use crate::driver::{Driver, Motion};
+use crate::rehearsal::Memory;
 use crate::{Controls, Pose};
 pub use parameters::{Drive, VehicleParameters};
 use response::Response;
@@ -141,6 +142,18 @@ impl Actor for Vehicle {
 
     fn bodies(&self) -> &[BodyId] {
         self.rig.bodies()
+    }
+
+    /// Throttle, brake, steering, whether reset was held, time until it works again.
+    fn memory(&self) -> Memory {
+        let [throttle, brake, steer] = self.response.to_array();
+        [throttle, brake, steer, f64::from(u8::from(self.reset_was_held)), self.reset_rest, 0.0, 0.0, 0.0]
+    }
+
+    fn recall(&mut self, memory: &Memory) {
+        let [throttle, brake, steer, held, rest, ..] = *memory;
+        self.response = Response::from_array([throttle, brake, steer]);
+        (self.reset_was_held, self.reset_rest) = (held != 0.0, rest);
     }
 
     fn control(&mut self, controls: Controls) {

@@ -18,7 +18,10 @@ impl Arena {
     /// # Errors
     /// Any [`ArenaError`]; it names the key, its value and what is allowed.
     pub fn from_toml(text: &str, settings: &ArenaSettings) -> Result<Self, ArenaError> {
-        let file = ArenaFile::parse(text)?;
+        Self::from_file(&ArenaFile::parse(text)?, settings)
+    }
+
+    pub(super) fn from_file(file: &ArenaFile, settings: &ArenaSettings) -> Result<Self, ArenaError> {
         Key::new("tick_hz").count(settings.tick_hz.into(), 1, 1_000, "Hz")?;
         let dt = 1.0 / f64::from(settings.tick_hz);
         let gravity = DVec3::NEG_Y * file.gravity;
@@ -38,7 +41,7 @@ impl Arena {
             owners: BTreeMap::new(),
             collisions: Vec::new(),
             vehicle: file.vehicle.clone(),
-            spawns: spawn_points(&file),
+            spawns: spawn_points(file),
             actors: BTreeMap::new(),
             next_actor: 0,
             slots: BTreeMap::new(),
@@ -46,10 +49,10 @@ impl Arena {
             commands: Vec::new(),
             acting: Vec::new(),
         };
-        arena.set_material_pairs(&file)?;
-        arena.add_statics(&file)?;
-        arena.add_props(&file)?;
-        arena.add_drivers(&file)?;
+        arena.set_material_pairs(file)?;
+        arena.add_statics(file)?;
+        arena.add_props(file)?;
+        arena.add_drivers(file)?;
         // What was there from the start is in the description, it did not happen.
         arena.events.clear();
         Ok(arena)

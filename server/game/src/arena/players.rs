@@ -9,7 +9,7 @@ use crate::spawn;
 use crate::vehicle::{Identity, Vehicle};
 
 impl Arena {
-    pub(super) fn apply(&mut self, command: Command) {
+    pub(crate) fn apply(&mut self, command: Command) {
         match command {
             Command::Enter { slot, name } => self.enter(slot, name),
             Command::Leave { slot, reason } => self.leave(slot, reason),

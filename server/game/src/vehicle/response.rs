@@ -31,6 +31,16 @@ impl Response {
         }
     }
 
+    /// Throttle, brake and steering.
+    pub fn to_array(self) -> [f64; 3] {
+        [self.throttle, self.brake, self.steer]
+    }
+
+    /// What [`Self::to_array`] answered.
+    pub fn from_array([throttle, brake, steer]: [f64; 3]) -> Self {
+        Self { throttle, brake, steer }
+    }
+
     /// 0 to 1.
     pub fn throttle(&self) -> f64 {
         self.throttle

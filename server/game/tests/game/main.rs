@@ -6,5 +6,6 @@ mod driving;
 mod handling;
 mod pipeline;
 mod players;
+mod rehearsals;
 mod reproducibility;
 mod test_track;
