@@ -5,11 +5,11 @@ use pita_protocol::message::Event;
 use pita_tests::process::Signal;
 
 use crate::clients::{bots_process, connect, next_snapshot};
-use crate::{SOON, await_clients, eventually, start_server};
+use crate::{SOON, await_clients, eventually, start_patient_server};
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_car_of_a_killed_client_is_taken_out() {
-    let (server, observer) = start_server().await;
+    let (server, observer) = start_patient_server().await;
     let witness = connect(&server.endpoint, "witness").await;
     let bots = bots_process(&server.endpoint, 1);
     await_clients(&observer, 2).await;
@@ -24,7 +24,7 @@ async fn the_car_of_a_killed_client_is_taken_out() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_car_of_a_dropped_session_is_taken_out() {
-    let (server, observer) = start_server().await;
+    let (server, observer) = start_patient_server().await;
     let witness = connect(&server.endpoint, "witness").await;
     let dropped = connect(&server.endpoint, "dropped").await;
     let victim = other_vehicle(&witness).await;
