@@ -63,6 +63,11 @@ impl Hull {
         }
     }
 
+    /// Where it is; `None` where its body takes no part.
+    pub fn pose(&self) -> Option<Pose> {
+        (self.bounds != Bound::EMPTY).then_some(self.pose)
+    }
+
     /// What the fine phase sees of it.
     pub fn moving<'a>(&self, bodies: Bodies<'a>) -> Option<Moving<'a>> {
         let collider = bodies.collider(&self.placed)?;

@@ -16,6 +16,7 @@ mod manifold;
 mod material;
 mod narrow_phase;
 mod proximity;
+mod query;
 mod shape;
 mod trees;
 
@@ -27,6 +28,7 @@ pub use collision::{Collision, CollisionId, CollisionObject, CollisionSide, Phas
 pub use groups::Groups;
 pub use material::{Material, MaterialId, Surface};
 pub use proximity::{At, Proximity, proximity};
+pub use query::{Nearest, QueryFilter, RayHit};
 pub use shape::{Collider, HULL_POINTS_MAX, Shape};
 
 use crate::dof::{BodyId, Placed, Pose, Twist};
@@ -339,7 +341,7 @@ impl Detector {
     }
 
     /// Bodies that sleep on, or in, a piece of static geometry; `None` where nobody knows: it has no bounds.
-    pub fn sleepers_around(&mut self, id: StaticId) -> Option<Vec<BodyId>> {
+    pub fn sleepers_around(&self, id: StaticId) -> Option<Vec<BodyId>> {
         self.statics.get(id).map_or(Some(Vec::new()), |piece| piece.piece.map(|key| self.trees.sleepers_around(key)))
     }
 

@@ -6,6 +6,7 @@
 //!
 //! What wakes during a detection comes in rounds: each finds the pairs of those that have arrived with it.
 
+use glam::DVec3;
 use slab::Slab;
 
 use super::hull::{Bodies, Hull};
@@ -50,6 +51,13 @@ struct Piece {
     serial: u32,
     bounds: Bound,
     leaf: Leaf,
+}
+
+/// What a question finds.
+#[derive(Clone, Copy)]
+pub(super) enum Found<'a> {
+    Hull(&'a Hull),
+    Piece(StaticId),
 }
 
 /// The trees.
@@ -120,16 +128,21 @@ impl Trees {
     /// Takes a hull out of the sleeping tree. [`Trees::sort_awake`] follows.
     pub fn wake(&mut self, key: u32) {
         self.take_out(key);
-        self.entries[key as usize].place = Place::New;
+        let entry = &mut self.entries[key as usize];
+        entry.place = Place::Dynamic(self.dynamic.insert(key, entry.hull.bounds));
+        entry.has_changed = true;
+        self.changed.push(key);
         self.awake.push(key);
         self.woken.push(key);
     }
 
-    /// Brings the list of those that are awake up to date.
+    /// Brings the list of those that are awake, and the trees, up to date.
     pub fn sort_awake(&mut self) {
         let Self { entries, awake, .. } = self;
         awake.retain(|&key| !entries[key as usize].sleeps());
         awake.sort_by_key(|&key| entries[key as usize].hull.placed.serial);
+        self.dynamic.refit();
+        self.sleeping.refit();
     }
 
     /// Takes a piece of static geometry in. Answers its key.
@@ -148,11 +161,10 @@ impl Trees {
     }
 
     /// Bodies that sleep within the bounds of a piece of static geometry.
-    pub fn sleepers_around(&mut self, key: u32) -> Vec<BodyId> {
-        let Self { entries, pieces, sleeping, .. } = self;
+    pub fn sleepers_around(&self, key: u32) -> Vec<BodyId> {
         let mut bodies = Vec::new();
-        sleeping.refit();
-        sleeping.overlapping(&pieces[key as usize].bounds, |key| bodies.push(entries[key as usize].hull.placed.body));
+        let bounds = &self.pieces[key as usize].bounds;
+        self.sleeping.overlapping(bounds, |key| bodies.push(self.hull(key).placed.body));
         bodies
     }
 
@@ -260,5 +272,41 @@ impl Trees {
         let pairs = self.near_fixed.iter().filter(move |pair| arrives(pair[0]));
         let pairs = pairs.map(|&[hull, piece]| (self.hull(hull), &self.pieces[piece as usize]));
         pairs.filter(|(hull, piece)| hull.bounds.overlaps(&piece.bounds)).map(|(hull, piece)| (hull, piece.id))
+    }
+
+    /// Hands `found` all whose bounds overlap `bounds`, in no order.
+    pub fn overlapping<'a>(&'a self, bounds: &Bound, mut found: impl FnMut(Found<'a>)) {
+        for tree in [&self.dynamic, &self.sleeping] {
+            tree.overlapping(bounds, |key| found(Found::Hull(self.hull(key))));
+        }
+        self.fixed.overlapping(bounds, |key| found(self.piece(key)));
+    }
+
+    /// Hands `hit` all whose bounds a ray meets, as [`KdopTree::cast`].
+    pub fn cast<'a>(&'a self, origin: DVec3, direction: DVec3, mut length: f64, mut hit: impl FnMut(Found<'a>) -> f64) {
+        let mut meet = |length: &mut f64, found: Found<'a>| {
+            *length = hit(found);
+            *length
+        };
+        for tree in [&self.dynamic, &self.sleeping] {
+            tree.cast(origin, direction, length, |key| meet(&mut length, Found::Hull(self.hull(key))));
+        }
+        self.fixed.cast(origin, direction, length, |key| meet(&mut length, self.piece(key)));
+    }
+
+    /// Hands `near` all that may be nearer to a point than `distance`, as [`KdopTree::nearest`].
+    pub fn nearest<'a>(&'a self, point: DVec3, mut distance: f64, mut near: impl FnMut(Found<'a>) -> f64) {
+        let mut meet = |distance: &mut f64, found: Found<'a>| {
+            *distance = near(found);
+            *distance
+        };
+        for tree in [&self.dynamic, &self.sleeping] {
+            tree.nearest(point, distance, |key| meet(&mut distance, Found::Hull(self.hull(key))));
+        }
+        self.fixed.nearest(point, distance, |key| meet(&mut distance, self.piece(key)));
+    }
+
+    fn piece(&self, key: u32) -> Found<'_> {
+        Found::Piece(self.pieces[key as usize].id)
     }
 }

@@ -6,6 +6,7 @@ mod collisions;
 mod conserved;
 mod joints;
 mod potentials;
+mod queries;
 mod sleep;
 mod state;
 

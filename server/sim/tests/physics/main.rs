@@ -15,6 +15,7 @@ mod natural;
 mod over_determined;
 mod own_kind;
 mod potentials;
+mod queries;
 mod restitution;
 mod sheep;
 mod sheep_forms;
