@@ -40,6 +40,8 @@ pub(crate) struct FigureBody {
     pub colliders: Vec<PartCollider>,
     /// What steers it.
     pub controls: Vec<f64>,
+    /// What code asked to act on each rate in the coming tick, N or N m.
+    pub force: Vec<f64>,
     /// Change of the rates in the last tick.
     pub change: Vec<f64>,
     /// What resists each rate at the start, kg or kg m².
@@ -114,9 +116,24 @@ impl FigureBody {
         };
         let masses = masses(&*desc.dof, &desc.q);
         let (controls, change) = (desc.dof.controls(), vec![0.0; desc.v.len()]);
+        let force = change.clone();
         let rods = vec![Memory::default(); desc.dof.rods().len()];
         let ranks = minimum_degree(desc.dof.blocks().len(), &couplings(&*desc.dof, &desc.q));
-        Self { controls, change, masses, ranks, mass, rods, dof: desc.dof, colliders: desc.colliders }
+        Self { controls, force, change, masses, ranks, mass, rods, dof: desc.dof, colliders: desc.colliders }
+    }
+
+    /// Pulls at a material point with `force`, N, in the coming tick. What it does to each rate is that of where the figure
+    /// is now, at `q`.
+    pub fn pull(&mut self, at: PartPoint, force: DVec3, q: &[f64]) {
+        let Self { dof, force: on_rates, .. } = self;
+        let blocks = dof.blocks();
+        dof.jacobian(at, q, &mut |block, columns| {
+            let start: usize = blocks[..block].iter().map(|block| usize::from(block.rates)).sum();
+            let rates = &mut on_rates[start..start + usize::from(blocks[block].rates)];
+            for (on_rate, column) in rates.iter_mut().zip(columns) {
+                *on_rate += DVec3::from_slice(column).dot(force);
+            }
+        });
     }
 
     /// Energy that its own potentials hold, J.

@@ -109,15 +109,15 @@ pub(crate) struct Body {
     pub collider: Option<Collider>,
     /// What a body of a general kind is.
     pub figure: Option<FigureBody>,
-    /// Force and torque about the centre of mass asked for by code, for the coming tick, N and N m.
+    /// Force and torque about the centre of mass asked for by code, for the coming tick, N and N m; a figure has its own.
     pub force: DVec3,
     pub torque: DVec3,
     /// What potentials did to its twist in the last tick.
     pub impulse: Twist,
     /// Its index among the bodies that take part in this tick; [`ABSENT`] where it does not.
     pub index: u32,
-    /// An axle carries it: it spins about its own z axis, and what turns that axis is the axle.
-    pub is_wheel: bool,
+    /// Unit vector of the body about which it spins in this tick, where what turns that axis is an axle or a hinge.
+    pub wheel_axis: Option<DVec3>,
     /// Its state became non-finite: it stays where it last was sane, outside dynamics and collision.
     pub quarantined: bool,
     /// How still it has been.
@@ -231,6 +231,11 @@ impl Node {
         Twist { linear, angular: self.target.angular + self.impulse.angular }
     }
 
+    /// Angular velocity of a wheel whose `axis` gets to `wanted` within the tick while it spins on, rad/s.
+    pub fn following(&self, axis: DVec3, wanted: DVec3, dt: f64) -> DVec3 {
+        axis * axis.dot(self.before.angular) + axis.cross(wanted) / dt
+    }
+
     /// The twist of a momentum.
     pub fn divide_by_mass(&self, momentum: Twist) -> Twist {
         let angular = if self.rotates { self.inverse_inertia * momentum.angular } else { DVec3::ZERO };
@@ -293,6 +298,14 @@ impl Body {
         }
         state.q_mut(self.slice).copy_from_slice(q1);
         state.v_mut(self.slice).copy_from_slice(v1);
+    }
+
+    /// Forgets what code asked for: forces are for one tick, whether the body takes part in it or not.
+    pub fn forget_forces(&mut self) {
+        (self.force, self.torque) = Default::default();
+        if let Some(figure) = &mut self.figure {
+            figure.force.fill(0.0);
+        }
     }
 
     /// Takes the body out of dynamics and collision: at rest, where `place` puts it.

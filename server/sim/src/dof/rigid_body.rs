@@ -26,7 +26,7 @@ pub(super) fn twist(v: &[f64]) -> Twist {
 
 pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: Gravity) -> Node {
     let (start, before) = (pose(q), twist(v));
-    let wheel_axis = body.is_wheel.then(|| start.rotation * DVec3::Z);
+    let wheel_axis = body.wheel_axis.map(|axis| start.rotation * axis);
     let free_rotation = match wheel_axis {
         Some(_) => start.rotation,
         None => torque_free_flow(start.rotation, before.angular, body.inertia, dt),
@@ -39,7 +39,7 @@ pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: Gravity)
         linear: before.linear + gravity.fall(dt) + dt * (body.force / body.mass),
         angular: carried_spin + dt * (inverse_inertia * body.torque),
     };
-    let free_spin = if body.is_wheel { DVec3::ZERO } else { carried_spin };
+    let free_spin = if body.wheel_axis.is_some() { DVec3::ZERO } else { carried_spin };
     let mass = body.mass;
     let (rotates, guessed_spin) = (true, None);
     Node {

@@ -25,6 +25,8 @@ pub(crate) struct Figure {
     pub q1: Vec<f64>,
     pub v1: Vec<f64>,
     controls: Vec<f64>,
+    /// What code asked to act on each rate, N or N m.
+    force: Vec<f64>,
     prepared: Vec<f64>,
     gradient: Vec<f64>,
     /// The parts' centres of mass among the attachments; empty where points carry the mass.
@@ -99,7 +101,7 @@ impl Figures {
         }
         let figure = &mut self.list[self.used];
         figure.dof = Arc::clone(&body.dof);
-        figure.start(blocks, [q, v], &body.controls);
+        figure.start(blocks, [q, v], body);
         figure.prepare(dt);
         self.used += 1;
         self.used as u32 - 1
@@ -282,6 +284,7 @@ impl Figure {
             q1: Vec::new(),
             v1: Vec::new(),
             controls: Vec::new(),
+            force: Vec::new(),
             prepared: Vec::new(),
             gradient: Vec::new(),
             parts: 0..0,
@@ -293,7 +296,7 @@ impl Figure {
         }
     }
 
-    fn start(&mut self, blocks: impl Iterator<Item = u32>, [q, v]: [&[f64]; 2], controls: &[f64]) {
+    fn start(&mut self, blocks: impl Iterator<Item = u32>, [q, v]: [&[f64]; 2], body: &FigureBody) {
         self.blocks.clear();
         self.blocks.extend(blocks);
         self.offsets.clear();
@@ -303,7 +306,8 @@ impl Figure {
             offset += u32::from(size.rates);
         }
         let state = [(&mut self.q0, q), (&mut self.q1, q), (&mut self.v0, v), (&mut self.v1, v)];
-        for (mine, theirs) in state.into_iter().chain([(&mut self.controls, controls)]) {
+        let asked = [(&mut self.controls, &*body.controls), (&mut self.force, &*body.force)];
+        for (mine, theirs) in state.into_iter().chain(asked) {
             mine.clear();
             mine.extend_from_slice(theirs);
         }
@@ -380,6 +384,10 @@ impl Figure {
         gradient.clear();
         gradient.resize(self.v1.len(), 0.0);
         let mut energy = self.dof.energy(&self.local_state(dt, false), &mut gradient);
+        for (i, force) in self.force.iter().enumerate() {
+            gradient[i] -= force;
+            energy -= force * dt * (self.v1[i] - self.v0[i]);
+        }
         for (block, rates) in self.shares() {
             for (entry, g) in residual[block].iter_mut().zip(&gradient[rates]) {
                 *entry += dt * g;

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::attachment::trace;
 use super::problem::{Rates, Unknown};
 use super::step::{Integrator, Scene, Solve};
+use super::wheels;
 use crate::collide::{ContactPoint, Partner};
 use crate::dof::{ABSENT, BLOCK_RATES_MAX, BodyId, FigureBody, Frame, Inertia, Node, PartPoint, Placed, Twist};
 use crate::island::Islands;
@@ -39,19 +40,12 @@ enum Spot {
 impl Integrator {
     pub(super) fn gather_bodies(&mut self, scene: &mut Scene) {
         self.active.clear();
-        for &id in scene.order {
-            scene.bodies[id].is_wheel = false;
-        }
-        for (_, axle) in scene.potentials.axles.awake() {
-            let carried = scene.bodies.get(axle.chassis).is_some_and(|chassis| !chassis.quarantined);
-            scene.bodies[axle.wheel].is_wheel = carried;
-        }
+        wheels::find(scene);
         for &id in scene.order {
             let body = &mut scene.bodies[id];
             body.index = if body.quarantined { ABSENT } else { self.active.len() as u32 };
             if body.quarantined {
-                // Forces are for one tick, whether the body takes part in it or not.
-                (body.force, body.torque) = Default::default();
+                body.forget_forces();
             } else {
                 self.active.push(Active { id, start: ABSENT, figure: ABSENT });
             }
@@ -144,10 +138,7 @@ impl Integrator {
             let nodes = [0, 1].map(|i| solve.node(frames[i]));
             let [Some(chassis), Some(wheel)] = nodes else { continue };
             let term = AxleTerm::new(frames, desc, [chassis, wheel], solver.joint_stiffness, *dt);
-            let spin = term.guess_spin([chassis, wheel], *dt);
-            if let Unknown::Body(node) = &mut solve.problem.unknowns[frames[1] as usize] {
-                node.guessed_spin = Some(spin);
-            }
+            solve.carry_wheel(ends, [term.axis(), DVec3::Z]);
             solve.problem.terms.axles.push(term);
         }
         for (_, (desc, gains)) in scene.potentials.pds.awake() {

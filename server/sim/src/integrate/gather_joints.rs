@@ -20,7 +20,10 @@ impl Integrator {
             let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
             let scale = solve.scale(ends, solve.places(ends), least);
             let place = BallJointTerm::new(ends, desc.tolerance, scale, memory);
-            let turns = Alignment::new([axis], desc.tilt, solve.turn_scale(ends, least), memory);
+            let mut turns = Alignment::new([axis], desc.tilt, solve.turn_scale(ends, least), memory);
+            if let Some(axis) = solve.carry_wheel(ends, axis) {
+                turns = turns.of_wheel(axis);
+            }
             solve.problem.terms.hinges.push(Aligned { place, turns });
             solve.hinges.push(id);
         }

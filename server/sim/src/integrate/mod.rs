@@ -21,6 +21,7 @@ mod pull_back;
 mod solver;
 mod step;
 mod vector;
+mod wheels;
 
 pub use solver::StoppedBecause;
 pub use solver::method::{Method, Preconditioner};

@@ -163,8 +163,7 @@ impl Integrator {
                 let solve = self.solves.get(self.islands.island_of(body.index) as usize);
                 land(body, active, solve, (scene.settings, scene.state), &mut report);
             }
-            // Forces are for one tick, whether the body takes part in it or not.
-            (body.force, body.torque) = Default::default();
+            body.forget_forces();
         }
         for solve in &self.solves[..self.islands.len()] {
             solve.write_back(scene, &mut report);

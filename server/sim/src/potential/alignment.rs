@@ -32,6 +32,8 @@ pub(crate) struct Captured<Desc, const N: usize> {
 pub(crate) struct Alignment<const N: usize> {
     axes: [[DVec3; 2]; N],
     hold: Hold,
+    /// Axis of a wheel at the start of the tick.
+    wheel_axis: Option<DVec3>,
 }
 
 impl<const N: usize> Alignment<N> {
@@ -39,7 +41,14 @@ impl<const N: usize> Alignment<N> {
 
     /// `axes` are unit vectors in both frames; `tilt` is the tolerance, rad.
     pub fn new(axes: [[DVec3; 2]; N], tilt: f64, scale: Scale, memory: Memory) -> Self {
-        Self { axes, hold: Hold::new(scale, tilt, memory.turn_stiffening) }
+        Self { axes, hold: Hold::new(scale, tilt, memory.turn_stiffening), wheel_axis: None }
+    }
+
+    /// The same for a direction about which one of the frames spins, `axis` at the start of the tick. Where that goes is a
+    /// function of the turn across it alone (see `Node`), so there is no torque about it: the part about it that an
+    /// unconverged plane's would have makes wheels spin away.
+    pub fn of_wheel(self, axis: DVec3) -> Self {
+        Self { wheel_axis: Some(axis), ..self }
     }
 
     fn directions<S: Scalar>(&self, at: [&Frame<S>; 2]) -> [[Vec3<S>; 2]; N] {
@@ -78,6 +87,9 @@ impl<const N: usize> Turns for Alignment<N> {
             energy += (a - b).dot(a - b);
             torque += a.cross(b);
         }
+        if let Some(axis) = self.wheel_axis {
+            torque = torque - Vec3::constant(axis).scale(torque.along(axis));
+        }
         let stiffness = Self::WEIGHT * self.hold.stiffness;
         (energy * (0.5 * stiffness), torque * stiffness)
     }
@@ -86,7 +98,7 @@ impl<const N: usize> Turns for Alignment<N> {
     /// is not symmetric.
     fn stiffness(&self, at: [&Frame<f64>; 2]) -> DMat3 {
         let across = |[a, b]: [Vec3<f64>; 2]| {
-            let middle = DVec3::from(a + b).normalize_or_zero();
+            let middle = self.wheel_axis.unwrap_or_else(|| DVec3::from(a + b).normalize_or_zero());
             DMat3::IDENTITY - outer(middle, middle)
         };
         let sum = self.directions(at).map(across).into_iter().fold(DMat3::ZERO, |sum, k| sum + k);

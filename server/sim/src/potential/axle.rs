@@ -116,13 +116,9 @@ impl AxleTerm {
         }
     }
 
-    /// The wheel's angular velocity if the chassis turns on as it did and the wheel's plane follows it and the steering,
-    /// rad/s. The wheel's own momentum says something else: it resists any turn of the plane.
-    pub fn guess_spin(&self, [chassis, wheel]: [&Node; 2], dt: f64) -> DVec3 {
-        let turn = chassis.before.angular;
-        let wanted = DQuat::from_scaled_axis(dt * turn) * chassis.start.rotation * self.axis;
-        let spin = self.spin_axis * self.spin_axis.dot(wheel.before.angular);
-        spin + self.spin_axis.cross(wanted) / dt
+    /// The wheel's axis as it is steered, in the chassis' frame.
+    pub fn axis(&self) -> DVec3 {
+        self.axis
     }
 
     /// Hub in the chassis' frame, from where it would be without load, m.

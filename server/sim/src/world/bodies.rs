@@ -87,7 +87,7 @@ impl World {
         let (slice, serial) = (self.state.allocate(size.0, size.1), self.serials);
         self.serials += 1;
         let (force, torque, impulse, index) = (DVec3::ZERO, DVec3::ZERO, Twist::REST, ABSENT);
-        let (is_wheel, quarantined, rest, asleep) = (false, false, Rest::new(size.1), None);
+        let (wheel_axis, quarantined, rest, asleep) = (None, false, Rest::new(size.1), None);
         let (has_collider, figure) = (collider.is_some(), None);
         let id = self.bodies.insert(Body {
             kind,
@@ -101,7 +101,7 @@ impl World {
             torque,
             impulse,
             index,
-            is_wheel,
+            wheel_axis,
             quarantined,
             rest,
             asleep,

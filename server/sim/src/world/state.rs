@@ -92,10 +92,11 @@ impl World {
         Ok(())
     }
 
-    /// Pushes a body during the coming tick with `force`, N, at the world point `at`, m.
+    /// Pushes a particle or rigid body during the coming tick with `force`, N, at the world point `at`, m. Bodies of other
+    /// kinds are pushed at a point of a part: [`World::apply_force_at`].
     ///
     /// # Errors
-    /// [`SimError`] for a value out of range, or a body that is gone.
+    /// [`SimError`] for a value out of range, a body of another kind, or one that is gone.
     pub fn apply_force(&mut self, id: BodyId, force: DVec3, at: DVec3) -> Result<(), SimError> {
         require_vector(force, "force")?;
         require_vector(at, "at")?;
@@ -107,6 +108,30 @@ impl World {
         let arm = at - body.pose(&self.state).position;
         body.force += force;
         body.torque += arm.cross(force);
+        Ok(())
+    }
+
+    /// Pushes a body of any kind during the coming tick with `force`, N, at a material point; a particle has but one.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, a part that there is not, or a body that is gone.
+    pub fn apply_force_at(&mut self, id: BodyId, at: PartPoint, force: DVec3) -> Result<(), SimError> {
+        require_vector(force, "force")?;
+        require_vector(at.point, "at.point")?;
+        let body = self.bodies.get(id).ok_or(SimError::Gone { what: "the body" })?;
+        let parts = body.figure.as_ref().map_or(1, |figure| figure.dof.parts());
+        require(at.part < parts, "at.part", f64::from(at.part), "the index of one of the body's parts")?;
+        if force != DVec3::ZERO {
+            self.rouse(id);
+        }
+        let body = &mut self.bodies[id];
+        match &mut body.figure {
+            Some(figure) => figure.pull(at, force, self.state.q(body.slice)),
+            None => {
+                body.force += force;
+                body.torque += (body.pose(&self.state).rotation * at.point).cross(force);
+            }
+        }
         Ok(())
     }
 

@@ -7,6 +7,7 @@ mod collisions;
 mod contact_events;
 mod determinism;
 mod elasticity;
+mod figures;
 mod fine_phase;
 mod hostile;
 mod joints;
@@ -22,6 +23,7 @@ mod sheep_forms;
 mod sleep;
 mod solvers;
 mod tolerance;
+mod wheels;
 
 use pita_sim::{BodyId, Collider, DVec3, ParticleDesc, RigidBodyDesc, Settings, Shape, StaticDesc, World};
 

@@ -192,3 +192,48 @@ fn twist<S: Scalar>(rotation: &Turning<S>, axis: DVec3) -> (S, Vec3<S>) {
     let sign = if w.below(0.0) { -1.0 } else { 1.0 };
     ((along * sign).atan2(w * sign) * 2.0, rotation.pull_back(direction))
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::autodiff::Dual;
+
+    fn vector() -> impl Strategy<Value = DVec3> {
+        prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from_array)
+    }
+
+    fn variables(turn: DVec3) -> Vec3<Dual<3>> {
+        let [x, y, z] = [0, 1, 2].map(|i| Dual::variable(turn[i], i));
+        Vec3 { x, y, z }
+    }
+
+    proptest! {
+        /// The derivatives of swing and twist, as written, are those by automatic differentiation of their values, and by
+        /// differences; and so are their second derivatives.
+        #[test]
+        fn swing_and_twist_derive(start in vector(), turn in vector(), axis in vector()) {
+            prop_assume!(axis.length() > 0.1);
+            let (start, axis) = (DQuat::from_scaled_axis(start * 1.5), axis.normalize());
+            type Measure = fn(&Turning<Dual<3>>, DVec3) -> (Dual<3>, Vec3<Dual<3>>);
+            for (name, measure) in [("swing", swing as Measure), ("twist", twist)] {
+                let at = |turn: DVec3| measure(&Turning::new(start, variables(turn)), axis);
+                let (value, gradient) = at(turn);
+                // Off the kinks: straight ahead, straight back, and half a turn.
+                prop_assume!(value.value.abs() > 1e-2 && value.value.abs() < 3.0 && gradient.value().length() < 20.0);
+                let automatic = DVec3::from_array(value.tangent);
+                prop_assert!((automatic - gradient.value()).length() < 1e-9, "{}: {} {}", name, automatic, gradient.value());
+                let (_, _, bend) = differentiate(turn, |turn| measure(&Turning::new(start, turn), axis));
+                for (i, axis) in DVec3::AXES.into_iter().enumerate() {
+                    let h = 1e-6;
+                    let (above, below) = (at(turn + axis * h), at(turn - axis * h));
+                    let slope = (above.0.value - below.0.value) / (2.0 * h);
+                    prop_assert!((slope - automatic[i]).abs() < 1e-6, "{}: {} {}", name, slope, automatic);
+                    let column = (above.1.value() - below.1.value()) / (2.0 * h);
+                    prop_assert!((column - bend.col(i)).length() < 1e-4, "{}: {} {}", name, column, bend.col(i));
+                }
+            }
+        }
+    }
+}

@@ -194,13 +194,12 @@ impl Lattice {
     fn prepare_gauss_points(&self, shape: &RestShape, prepared: &mut Vec<f64>) -> bool {
         let middle = (self.desc.min + self.desc.max) / 2.0;
         let foot = DVec3::new(middle.x, self.desc.min.y, middle.z);
-        let rest: Vec<DVec3> = self.nodes.rest.iter().map(|&node| foot + shape.map(node - foot)).collect();
         let mut upright = true;
         for cell in &self.cells {
+            let rest = cell.nodes.map(|node| foot + shape.map(self.nodes.rest[node as usize] - foot));
             for place in gauss_points() {
                 let gradients = trilinear_gradients(place);
-                let column =
-                    |k: usize| gradients.iter().zip(cell.nodes).map(|(g, node)| rest[node as usize] * g[k]).sum();
+                let column = |k: usize| gradients.iter().zip(rest).map(|(g, node)| node * g[k]).sum();
                 let jacobian = DMat3::from_cols(column(0), column(1), column(2));
                 let volume = jacobian.determinant() / CORNERS as f64;
                 upright &= volume > 0.0;
