@@ -4,15 +4,13 @@
 
 use std::{
     collections::VecDeque,
-    sync::{
-        Arc,
-        atomic::{AtomicU64, Ordering},
-    },
+    sync::Arc,
     time::{Duration, Instant},
 };
 
 use pita_protocol::{
-    decode,
+    WireError, decode,
+    dof::Decoder,
     message::{FATES_MAX, InputAck, InputFate, JoinAccepted, Snapshot},
 };
 
@@ -50,8 +48,8 @@ pub struct Inbox {
     /// Newest sequence of which the fate has been counted.
     counted: u32,
     statistics: Statistics,
-    /// Snapshots whose slices could not be read, which shows only when somebody asks for them.
-    malformed_slices: Arc<AtomicU64>,
+    decoder: Decoder,
+    tick_hz: f64,
 }
 
 impl Inbox {
@@ -69,7 +67,8 @@ impl Inbox {
             in_flight: VecDeque::new(),
             counted: 0,
             statistics: Statistics::default(),
-            malformed_slices: Arc::default(),
+            decoder: Decoder::default(),
+            tick_hz: f64::from(accepted.tick_hz),
         }
     }
 
@@ -87,13 +86,24 @@ impl Inbox {
                 return None;
             }
         };
+        let frame = match self.decoder.decode(head.tick, &head.dof) {
+            Ok(frame) => Arc::clone(frame),
+            Err(error) => {
+                self.statistics.malformed += 1;
+                if error == WireError::Desync {
+                    // Acknowledging nothing asks for a snapshot that needs nothing before it.
+                    self.decoder = Decoder::default();
+                }
+                return None;
+            }
+        };
         let arrival = self.ledger.note(head.tick);
         if arrival == Arrival::Stale {
             return None;
         }
         self.acknowledged(&head.ack, now);
         self.follow_clock(&head, now);
-        let snapshot = Arc::new(ReceivedSnapshot::new(head, now, Arc::clone(&self.malformed_slices)));
+        let snapshot = Arc::new(ReceivedSnapshot::new(head, frame, self.tick_hz, now));
         if self.recent_max > 0 {
             if self.recent.len() == self.recent_max {
                 self.recent.pop_front();
@@ -155,9 +165,9 @@ impl Inbox {
         self.in_flight.push_back((sequence, now));
     }
 
-    /// Newest tick that is known, from a snapshot or from the join.
-    pub fn newest_tick(&self) -> u64 {
-        self.newest.0
+    /// What an input packet acknowledges: the tick of the newest snapshot, 0 for none, and a bit for each before it.
+    pub fn acknowledgement(&self) -> (u64, u32) {
+        self.decoder.acknowledgement().unwrap_or((0, 0))
     }
 
     /// How long nothing newer arrived.
@@ -181,7 +191,6 @@ impl Inbox {
             snapshots_received: self.ledger.received(),
             snapshots_missed: self.ledger.missed(),
             snapshots_stale: self.ledger.stale(),
-            malformed: self.statistics.malformed + self.malformed_slices.load(Ordering::Relaxed),
             ..self.statistics.clone()
         }
     }
@@ -240,7 +249,13 @@ impl Inbox {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pita_protocol::{encode, message::Description, seal::SessionKey};
+    use pita_protocol::{
+        Message,
+        dof::{Encoder, Precision, State},
+        encode,
+        message::Description,
+        seal::SessionKey,
+    };
     use proptest::prelude::*;
 
     const EPOCH: u32 = 9;
@@ -274,7 +289,9 @@ mod tests {
     fn message(tick: u64, ack: u32) -> Vec<u8> {
         let mut ack = InputAck { sequence: ack, tick, ..InputAck::default() };
         (0..FATES_MAX).for_each(|behind| ack.fates.set(behind, InputFate::Applied { late_ticks: 0 }));
-        encode(&Snapshot { epoch: EPOCH, tick, ack, event_sequence: 0, dof: Vec::new() })
+        let state = State::new(Precision::default()).unwrap();
+        let dof = Encoder::default().encode(tick, &state, &[]);
+        encode(&Snapshot { epoch: EPOCH, tick, ack, event_sequence: 0, dof })
     }
 
     #[test]
@@ -326,7 +343,7 @@ mod tests {
             let now = Instant::now();
             let mut inbox = inbox(0, 2, now);
             for bytes in messages {
-                inbox.take_snapshot(&[&[1, 5][..], &bytes].concat(), now);
+                inbox.take_snapshot(&[&[pita_protocol::PROTOCOL_VERSION as u8, Snapshot::KIND][..], &bytes].concat(), now);
             }
             for (tick, ack) in acks {
                 inbox.note_sent(1, tick, 1, now);

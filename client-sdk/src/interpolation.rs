@@ -6,7 +6,7 @@
 use std::{collections::VecDeque, time::Duration};
 
 use glam::{Quat, Vec3};
-use pita_protocol::slices::{KIND_RIGID_BODY, Slice};
+use pita_protocol::dof::{Slice, kind};
 
 /// How a session turns snapshots into what is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +39,7 @@ impl InterpolationSettings {
 pub struct Frame {
     /// Tick whose end this is.
     pub tick: u64,
-    /// In order of id, as [`unpack`](pita_protocol::slices::unpack) answers them.
+    /// In order of id.
     pub slices: Vec<Slice>,
 }
 
@@ -130,7 +130,7 @@ fn interpolated(a: &Slice, b: &Slice, t: f32) -> Slice {
 
 fn carried_on(slice: &Slice, seconds: f32) -> Slice {
     let mut moved = slice.clone();
-    let positions = if slice.kind == KIND_RIGID_BODY { 3 } else { slice.q.len() };
+    let positions = if slice.kind == kind::RIGID_BODY { 3 } else { slice.q.len() };
     for (q, v) in moved.q.iter_mut().zip(&slice.v).take(positions) {
         *q = (*q + v * seconds).clamp(f32::MIN, f32::MAX);
     }
@@ -146,7 +146,7 @@ fn carried_on(slice: &Slice, seconds: f32) -> Slice {
 
 /// Unit quaternion of a rigid body; the identity where the numbers are none.
 fn rotation(slice: &Slice) -> Option<Quat> {
-    if slice.kind != KIND_RIGID_BODY {
+    if slice.kind != kind::RIGID_BODY {
         return None;
     }
     let numbers = slice.q.get(3..7)?;

@@ -43,5 +43,5 @@ pub use session::{Session, WorldState};
 pub use snapshot::ReceivedSnapshot;
 pub use statistics::{Durations, Statistics};
 
+pub use pita_protocol::dof::Slice;
 pub use pita_protocol::message::{ActorDescription, Controls, Description, Event, InputAck, InputFate, buttons};
-pub use pita_protocol::slices::{PackedSlice, Slice};

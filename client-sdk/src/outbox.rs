@@ -20,9 +20,15 @@ impl Outbox {
         Self { epoch, frames: VecDeque::with_capacity(INPUT_FRAMES_MAX) }
     }
 
-    /// Packet with `controls` meant for `tick` as its newest frame, acknowledging the snapshot of `snapshot_tick`.
+    /// Packet with `controls` meant for `tick` as its newest frame, acknowledging what the inbox says.
     /// Answers the sequence number of that frame too.
-    pub fn packet(&mut self, controls: Controls, tick: u64, snapshot_tick: u64, leave: bool) -> (u32, InputPacket) {
+    pub fn packet(
+        &mut self,
+        controls: Controls,
+        tick: u64,
+        acknowledged: (u64, u32),
+        leave: bool,
+    ) -> (u32, InputPacket) {
         // Reaches its end after four years at 30 Hz; the server then drops what follows as stale.
         let sequence = self.frames.back().map_or(0, |newest| newest.sequence).saturating_add(1);
         if self.frames.len() == INPUT_FRAMES_MAX {
@@ -30,7 +36,8 @@ impl Outbox {
         }
         self.frames.push_back(InputFrame { sequence, tick, controls });
         let frames = self.frames.iter().copied().collect();
-        (sequence, InputPacket { epoch: self.epoch, snapshot_tick, leave, frames })
+        let (snapshot_tick, snapshots_before) = acknowledged;
+        (sequence, InputPacket { epoch: self.epoch, snapshot_tick, snapshots_before, leave, frames })
     }
 }
 
@@ -43,7 +50,7 @@ mod tests {
     fn every_packet_is_valid_and_repeats_its_predecessors() {
         let mut outbox = Outbox::new(7);
         for n in 1..=20u32 {
-            let (sequence, packet) = outbox.packet(Controls::default(), 100 + u64::from(n), 99, false);
+            let (sequence, packet) = outbox.packet(Controls::default(), 100 + u64::from(n), (99, 5), false);
             assert_eq!((sequence, packet.epoch, packet.snapshot_tick, packet.leave), (n, 7, 99, false));
             assert_eq!(packet.validate(), Ok(()));
             assert_eq!(packet.frames.len(), (n as usize).min(INPUT_FRAMES_MAX));

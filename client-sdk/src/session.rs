@@ -6,8 +6,8 @@ use std::{
 };
 
 use pita_protocol::{
+    dof::Slice,
     message::{Controls, Description, JoinAccepted},
-    slices::Slice,
 };
 use tokio::{task::JoinHandle, time::timeout};
 
@@ -167,9 +167,7 @@ impl Session {
         let mut buffer = lock(buffer);
         for snapshot in recent {
             // One that cannot be read has been counted, and is a gap like a lost one.
-            if let Ok(slices) = snapshot.slices() {
-                buffer.insert(Frame { tick: snapshot.tick(), slices });
-            }
+            buffer.insert(Frame { tick: snapshot.tick(), slices: snapshot.slices() });
         }
         let tick = (tick? - delay.as_secs_f64() * f64::from(self.tick_hz())).max(0.0);
         Some(WorldState { tick, slices: buffer.sample(tick)? })

@@ -67,11 +67,11 @@ impl Wire {
     pub async fn send(&self, controls: Controls, leave: bool) -> Result<u32, ClientError> {
         controls.validate().map_err(ClientError::BadArgument)?;
         let now = Instant::now();
-        let (newest, tick) = {
+        let (acknowledged, tick) = {
             let inbox = lock(&self.shared.inbox);
-            (inbox.newest_tick(), inbox.input_tick(now))
+            (inbox.acknowledgement(), inbox.input_tick(now))
         };
-        let (sequence, packet) = lock(&self.outbox).packet(controls, tick, newest, leave);
+        let (sequence, packet) = lock(&self.outbox).packet(controls, tick, acknowledged, leave);
         let sealed = seal(&packet, &self.session_key, &self.key_expr);
         lock(&self.shared.inbox).note_sent(sequence, tick, sealed.len(), now);
         match &self.conditioner {

@@ -64,8 +64,11 @@ pub struct InputFrame {
 pub struct InputPacket {
     /// [`JoinAccepted::epoch`](crate::message::JoinAccepted::epoch) of the session.
     pub epoch: u32,
-    /// Newest snapshot that this client has: its acknowledgement.
+    /// Newest snapshot that this client decoded: its acknowledgement. 0 where it has none, or lost the thread: the next
+    /// snapshot then needs nothing before it.
     pub snapshot_tick: u64,
+    /// Bit i: it also decoded the snapshot of `snapshot_tick` − 1 − i.
+    pub snapshots_before: u32,
     /// The client leaves; nothing follows.
     pub leave: bool,
     /// The newest frame last, before it those that may have been lost.

@@ -1,7 +1,7 @@
 //! PITA's wire: what travels between the daemon and its clients.
 //!
 //! Owns: key expressions ([`keys`]), messages ([`message`], those of inputs in [`input`]), their encoding and limits ([`codec`]), authentication of
-//! inputs ([`seal`]) and the packing of DOF slices ([`slices`]). It does no I/O, reads no clock and knows no engine.
+//! inputs ([`seal`]), and the streams of DOF ([`dof`]). It does no I/O, reads no clock and knows no engine.
 //!
 //! Every byte that is decoded here is untrusted: decoding answers a [`WireError`], never panics, and allocates no more
 //! than the message's own limit.
@@ -13,7 +13,6 @@ pub mod input;
 pub mod keys;
 pub mod message;
 pub mod seal;
-pub mod slices;
 
 pub use codec::{Message, WireError, decode, encode};
 pub use keys::Keys;
@@ -21,7 +20,7 @@ pub use keys::Keys;
 /// Version of everything this crate encodes; the first field of every message.
 ///
 /// A peer of another version is refused at join with both numbers in the text.
-pub const PROTOCOL_VERSION: u16 = 1;
+pub const PROTOCOL_VERSION: u16 = 2;
 
 /// Where a daemon listens, and where clients look for it, unless told otherwise.
 pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";

@@ -197,7 +197,7 @@ pub struct ActorDescription {
 /// A slice with a shape.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PartDescription {
-    /// [`Slice::id`](crate::slices::Slice::id) in the snapshots.
+    /// [`Slice::id`](crate::dof::Slice::id) in the snapshots.
     pub slice: u32,
     /// Shape in the slice's frame.
     pub shape: Shape,
@@ -293,7 +293,7 @@ pub struct Snapshot {
     pub ack: InputAck,
     /// Number of the last event before this snapshot.
     pub event_sequence: u32,
-    /// All DOF, as [`slices`](crate::slices) packs them.
+    /// All DOF, a snapshot of the session's stream; see [`dof`](crate::dof).
     #[serde(with = "bytes")]
     pub dof: Vec<u8>,
 }
@@ -567,7 +567,7 @@ mod tests {
     fn packet(throttle: f32) -> InputPacket {
         let controls = Controls { throttle, ..Controls::default() };
         let frames = (1..=3).map(|sequence| InputFrame { sequence, tick: 7, controls }).collect();
-        InputPacket { epoch: 1, snapshot_tick: 6, leave: false, frames }
+        InputPacket { epoch: 1, snapshot_tick: 6, snapshots_before: 5, leave: false, frames }
     }
 
     #[test]
@@ -611,14 +611,14 @@ mod tests {
             controls: Controls { throttle: 1.0, brake: 1.0, steer: 1.0, buttons: u16::MAX },
         };
         let frames = (0..8).map(|i| InputFrame { sequence: u32::MAX - 8 + i, ..frame }).collect();
-        let packet = InputPacket { epoch: u32::MAX, snapshot_tick: u64::MAX, leave: true, frames };
+        let packet = InputPacket { epoch: u32::MAX, snapshot_tick: u64::MAX, snapshots_before: 5, leave: true, frames };
         assert!(encode(&packet).len() <= InputPacket::MAX_BYTES);
     }
 
     #[test]
     fn nine_bytes_cannot_claim_all_memory() {
         // Version, kind, then the marker and value of a length of 2^63.
-        let mut bomb = vec![1, Snapshot::KIND, 0, 0, 0, 0, 0, 253];
+        let mut bomb = vec![PROTOCOL_VERSION as u8, Snapshot::KIND, 0, 0, 0, 0, 0, 253];
         bomb.extend_from_slice(&(1u64 << 63).to_le_bytes());
         assert_eq!(decode::<Snapshot>(&bomb), Err(WireError::Malformed));
     }

@@ -99,7 +99,7 @@ mod tests {
 
     fn packet() -> InputPacket {
         let frame = InputFrame { sequence: 9, tick: 100, controls: Controls { throttle: 1.0, ..Controls::default() } };
-        InputPacket { epoch: 4, snapshot_tick: 98, leave: false, frames: vec![frame] }
+        InputPacket { epoch: 4, snapshot_tick: 98, snapshots_before: 1, leave: false, frames: vec![frame] }
     }
 
     #[test]

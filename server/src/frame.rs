@@ -6,8 +6,8 @@
 
 use crossbeam_queue::ArrayQueue;
 use pita_game::{Arena, ArenaEvent};
+use pita_protocol::dof::{Group, State, kind, relative};
 use pita_protocol::message::{InputAck, InputCounts, TickRecord};
-use pita_protocol::slices;
 use pita_sim::DofKind;
 
 use crate::sessions::SessionId;
@@ -55,12 +55,13 @@ pub struct Totals {
     pub inputs: InputCounts,
 }
 
-/// Q and Q' of every slice in single precision.
+/// Q of every slice. Q' is not sent: Q is piecewise linear in time.
 #[derive(Default)]
 struct Dof {
     heads: Vec<SliceHead>,
-    /// Of each slice Q, then Q'.
-    numbers: Vec<f32>,
+    numbers: Vec<f64>,
+    /// Parts of actors with the first part of each.
+    attached: Vec<(u32, u32)>,
 }
 
 #[derive(Clone, Copy)]
@@ -68,8 +69,6 @@ struct SliceHead {
     id: u32,
     kind: u8,
     start: u32,
-    n_q: u8,
-    n_v: u8,
 }
 
 impl Frame {
@@ -78,18 +77,22 @@ impl Frame {
         let world = arena.world();
         self.state_hash = world.state_hash();
         self.bodies = u32::try_from(world.body_count()).unwrap_or(u32::MAX);
-        self.dof.heads.clear();
-        self.dof.numbers.clear();
+        self.dof.clear();
         for slice in world.slices() {
             if let Some(kind) = kind_on_wire(slice.kind) {
-                self.dof.push(slice.serial, kind, slice.q, slice.v);
+                self.dof.push(slice.serial, kind, slice.q);
+            }
+        }
+        for actor in arena.actors() {
+            if let Some((first, others)) = actor.parts.split_first() {
+                self.dof.attached.extend(others.iter().map(|part| (part.slice, first.slice)));
             }
         }
     }
 
-    /// Packs all slices in order of their id, as [`slices`] says.
-    pub fn pack_dof(&mut self, out: &mut Vec<u8>) {
-        self.dof.pack(out);
+    /// All slices in order of their id, in steps; parts of an actor as seen from its first part.
+    pub fn quantise(&mut self, into: &mut State) {
+        self.dof.quantise(into);
     }
 
     fn clear(&mut self) {
@@ -101,30 +104,60 @@ impl Frame {
 }
 
 impl Dof {
-    fn push(&mut self, id: u32, kind: u8, q: &[f64], v: &[f64]) {
-        let start = self.numbers.len() as u32;
-        // Kinds have at most 255 numbers: slices::pack checks it.
-        self.heads.push(SliceHead { id, kind, start, n_q: q.len() as u8, n_v: v.len() as u8 });
-        // A finite number of the engine may be beyond single precision; the wire takes no infinity.
-        let single = |x: &f64| x.clamp(f32::MIN.into(), f32::MAX.into()) as f32;
-        self.numbers.extend(q.iter().chain(v).map(single));
+    fn clear(&mut self) {
+        self.heads.clear();
+        self.numbers.clear();
+        self.attached.clear();
     }
 
-    fn pack(&mut self, out: &mut Vec<u8>) {
+    fn push(&mut self, id: u32, kind: u8, q: &[f64]) {
+        let start = self.numbers.len() as u32;
+        self.heads.push(SliceHead { id, kind, start });
+        self.numbers.extend_from_slice(q);
+    }
+
+    fn quantise(&mut self, into: &mut State) {
         self.heads.sort_unstable_by_key(|head| head.id);
+        self.attached.sort_unstable();
+        into.clear();
         for head in &self.heads {
-            let (start, n_q) = (head.start as usize, usize::from(head.n_q));
-            let (q, v) = self.numbers[start..start + n_q + usize::from(head.n_v)].split_at(n_q);
-            slices::pack(head.id, head.kind, q.iter().copied(), v.iter().copied(), out);
+            let parent = self.parent(head);
+            let q = self.q(head);
+            let seen = parent.map(|parent| relative(self.q(parent), q));
+            let (layout, q) = (layout_of(head.kind), seen.as_ref().map_or(q, |seen| &seen[..]));
+            let pushed = into.push(head.id, head.kind, parent.map(|parent| parent.id), layout, q);
+            // A world of more bodies than a stream may have shows its oldest.
+            if pushed.is_err() {
+                break;
+            }
         }
     }
+
+    /// The body in whose frame `head` is coded: an earlier one, both of them rigid.
+    fn parent(&self, head: &SliceHead) -> Option<&SliceHead> {
+        let at = self.attached.binary_search_by_key(&head.id, |(part, _)| *part).ok()?;
+        let parent = self.heads.binary_search_by_key(&self.attached[at].1, |head| head.id).ok()?;
+        let parent = &self.heads[parent];
+        let are_rigid = head.kind == kind::RIGID_BODY && parent.kind == kind::RIGID_BODY;
+        (are_rigid && parent.id < head.id).then_some(parent)
+    }
+
+    fn q(&self, head: &SliceHead) -> &[f64] {
+        let count: usize = layout_of(head.kind).iter().map(|group| group.numbers()).sum();
+        &self.numbers[head.start as usize..][..count]
+    }
+}
+
+/// The groups of the kinds that [`kind_on_wire`] knows.
+fn layout_of(kind: u8) -> &'static [Group] {
+    if kind == kind::PARTICLE { &[Group::Point] } else { &[Group::Point, Group::Rotation] }
 }
 
 /// What the wire calls a kind; `None` for those that it does not carry yet, which no arena has.
 fn kind_on_wire(kind: DofKind) -> Option<u8> {
     match kind {
-        DofKind::Particle => Some(slices::KIND_PARTICLE),
-        DofKind::RigidBody => Some(slices::KIND_RIGID_BODY),
+        DofKind::Particle => Some(kind::PARTICLE),
+        DofKind::RigidBody => Some(kind::RIGID_BODY),
         _ => None,
     }
 }
@@ -179,19 +212,24 @@ impl Default for FramePool {
 
 #[cfg(test)]
 mod tests {
+    use pita_protocol::dof::Precision;
+
     use super::*;
 
     #[test]
-    fn slices_are_packed_in_order_of_id_and_always_finite() {
+    fn slices_come_in_order_of_id_and_parts_as_their_first_part_sees_them() {
         let mut dof = Dof::default();
-        dof.push(9, slices::KIND_PARTICLE, &[1.0, 2.0, 3.0], &[4.0, 5.0, 1e300]);
-        dof.push(4, slices::KIND_RIGID_BODY, &[0.5; 7], &[-1e-300; 6]);
-        let mut bytes = Vec::new();
-        dof.pack(&mut bytes);
-        let unpacked = slices::unpack(&bytes).unwrap();
-        assert_eq!(unpacked.iter().map(|slice| slice.id).collect::<Vec<_>>(), [4, 9]);
-        assert_eq!((unpacked[0].q.len(), unpacked[0].v.len()), (7, 6));
-        assert_eq!((&unpacked[1].q[..], unpacked[1].v[2]), (&[1.0, 2.0, 3.0][..], f32::MAX));
+        dof.push(9, kind::RIGID_BODY, &[12.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]);
+        dof.push(5, kind::PARTICLE, &[1.0, 2.0, f64::NAN]);
+        dof.push(4, kind::RIGID_BODY, &[10.0, 2.0, 3.0, 0.0, 1.0, 0.0, 0.0]);
+        dof.attached.extend([(5, 4), (9, 4)]);
+        let mut state = State::new(Precision::default()).unwrap();
+        dof.quantise(&mut state);
+        let bodies: Vec<_> = state.bodies().iter().map(|body| (body.id, body.parent)).collect();
+        assert_eq!(bodies, [(4, None), (5, None), (9, Some(4))]);
+        // Half a turn about y.
+        assert_eq!(state.groups(&state.bodies()[2])[0].steps, [-2000, 0, 0]);
+        assert_eq!(state.groups(&state.bodies()[1])[0].steps, [1000, 2000, 0]);
     }
 
     #[test]

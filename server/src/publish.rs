@@ -1,7 +1,7 @@
 //! The publishing thread: everything that leaves for clients without being asked for.
 //!
 //! Owns the declared publishers, one for each session and one for events, the numbering of events and the description
-//! that they add up to. It wakes for every frame, packs the state once, and puts one snapshot for each session. Nothing
+//! that they add up to. It wakes for every frame, quantises the state once, and puts one snapshot for each session. Nothing
 //! here waits for a client: snapshots and events are dropped where a connection takes no more.
 
 mod outlet;
@@ -11,6 +11,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use pita_game::ArenaEvent;
+use pita_protocol::dof::{Encoder, Precision, State};
 use pita_protocol::message::{Description, Event, EventMessage, InputAck, Role, Snapshot};
 
 use crate::answers::{Asker, Work};
@@ -25,13 +26,20 @@ use outlet::Outlet;
 /// How long the thread sleeps where nothing wakes it; sessions time out meanwhile.
 const IDLE: Duration = Duration::from_millis(100);
 
+/// One session's snapshots.
+struct Feed {
+    id: SessionId,
+    outlet: Outlet,
+    encoder: Encoder,
+}
+
 /// The thread's state.
 pub struct Publishing {
     shared: Arc<Shared>,
     session: zenoh::Session,
     asker: Asker,
     events: Outlet,
-    outlets: BTreeMap<u16, (SessionId, Outlet)>,
+    feeds: BTreeMap<u16, Feed>,
     ledger: Ledger,
     /// Waits for room on the way to the tick thread.
     boarding: VecDeque<Boarding>,
@@ -39,6 +47,8 @@ pub struct Publishing {
     description: Arc<Description>,
     tick: u64,
     snapshot: Snapshot,
+    /// The newest frame in steps, once for all sessions.
+    state: State,
     has_said_closing: bool,
 }
 
@@ -56,7 +66,8 @@ impl Publishing {
             shared,
             session,
             asker,
-            outlets: BTreeMap::new(),
+            feeds: BTreeMap::new(),
+            state: State::new(Precision::default())?,
             boarding: VecDeque::new(),
             changes: Vec::new(),
             tick: 0,
@@ -108,7 +119,7 @@ impl Publishing {
 
     fn begin_session(&mut self, id: SessionId, role: Role, name: String) {
         match Outlet::for_snapshots(&self.session, self.shared.keys.snapshot(id.slot)) {
-            Ok(outlet) => drop(self.outlets.insert(id.slot, (id, outlet))),
+            Ok(outlet) => drop(self.feeds.insert(id.slot, Feed { id, outlet, encoder: Encoder::default() })),
             Err(reason) => tracing::error!("no publisher for slot {}: {reason}", id.slot),
         }
         tracing::info!("slot {}: {name:?} joins as {role:?}", id.slot);
@@ -123,7 +134,7 @@ impl Publishing {
 
     /// The arena notices nothing: the car is there, or on its way.
     fn resume_session(&mut self, from: SessionId, to: SessionId) {
-        if let Some((id, _)) = self.outlets.get_mut(&to.slot) {
+        if let Some(Feed { id, .. }) = self.feeds.get_mut(&to.slot) {
             *id = to;
         }
         // Whoever still waits for the earlier join waits for nothing.
@@ -137,7 +148,7 @@ impl Publishing {
     }
 
     fn end_session(&mut self, id: SessionId, role: Role, reason: EndReason) {
-        self.outlets.remove(&id.slot);
+        self.feeds.remove(&id.slot);
         self.asker.tell(Work::Ended(id, reason));
         tracing::info!("slot {}: ended, {reason}", id.slot);
         let (slot, text) = (id.slot, reason.to_string());
@@ -205,27 +216,32 @@ impl Publishing {
         description::apply(Arc::make_mut(&mut self.description), &event, sequence, self.tick);
         self.shared.set_description(self.description.clone());
         let bytes = pita_protocol::encode(&EventMessage { sequence, tick: self.tick, event });
-        self.shared.counters.sent_bytes.add((bytes.len() * self.outlets.len()) as u64);
+        self.shared.counters.sent_bytes.add((bytes.len() * self.feeds.len()) as u64);
         self.events.put(bytes);
     }
 
-    /// The same state for every session, with its own acknowledgement.
+    /// The state for every session, coded against what it acknowledged.
     fn publish_snapshots(&mut self, frame: &mut Frame) {
-        if self.outlets.is_empty() {
+        if self.feeds.is_empty() {
             return;
         }
-        self.snapshot.dof.clear();
-        frame.pack_dof(&mut self.snapshot.dof);
+        frame.quantise(&mut self.state);
         self.snapshot.tick = frame.tick;
         self.snapshot.event_sequence = self.description.event_sequence;
-        for (id, outlet) in self.outlets.values() {
+        for feed in self.feeds.values_mut() {
+            let id = feed.id;
+            match self.shared.sessions().acknowledged(id) {
+                (0, _) => feed.encoder.restart(),
+                (tick, before) => feed.encoder.acknowledge(tick, before),
+            }
+            self.snapshot.dof = feed.encoder.encode(frame.tick, &self.state, &[]);
             // Acknowledgements are in order of slot.
             let found = frame.acks.binary_search_by_key(&id.slot, |(acked, _)| acked.slot).map(|at| frame.acks[at]);
-            self.snapshot.ack = found.ok().filter(|(acked, _)| acked == id).map(|(_, ack)| ack).unwrap_or_default();
+            self.snapshot.ack = found.ok().filter(|(acked, _)| *acked == id).map(|(_, ack)| ack).unwrap_or_default();
             self.snapshot.epoch = id.epoch;
             let bytes = pita_protocol::encode(&self.snapshot);
             self.shared.counters.sent_bytes.add(bytes.len() as u64);
-            outlet.put(bytes);
+            feed.outlet.put(bytes);
         }
     }
 
@@ -234,7 +250,7 @@ impl Publishing {
         let (sent, received) = (counters.sent_bytes.get(), counters.received_bytes.get());
         let mut metrics = self.shared.metrics();
         // There are no more outlets than slots.
-        metrics.add_frame(frame, self.outlets.len() as u16);
+        metrics.add_frame(frame, self.feeds.len() as u16);
         metrics.add_traffic(Traffic { at_ms: self.shared.clock.ms(), sent, received });
     }
 }

@@ -153,6 +153,7 @@ struct Session {
     last_sequence: u32,
     inputs_tick: u64,
     inputs: u32,
+    acknowledged: (u64, u32),
 }
 
 /// Why nobody can join.
@@ -210,6 +211,7 @@ impl Sessions {
             last_sequence: 0,
             inputs_tick: 0,
             inputs: 0,
+            acknowledged: (0, 0),
         });
         self.changes.push(Change::Began { id, role, name: name.to_owned() });
         Ok(id)
@@ -230,7 +232,7 @@ impl Sessions {
             return Err(JoinRefusal::Over);
         }
         let to = SessionId { slot: from.slot, epoch: secrets.epoch };
-        (session.epoch, session.key) = (to.epoch, secrets.key);
+        (session.epoch, session.key, session.acknowledged) = (to.epoch, secrets.key, (0, 0));
         (session.heard_ms, session.away_since_ms, session.last_sequence) = (now_ms, None, 0);
         self.changes.push(Change::Resumed { from, to });
         Ok(to)
@@ -273,8 +275,17 @@ impl Sessions {
         }
         let newest = fresh.last().ok_or(InputRefusal::Stale)?;
         session.last_sequence = newest.sequence;
+        session.acknowledged = (packet.snapshot_tick, packet.snapshots_before);
         (session.heard_ms, session.away_since_ms) = (now_ms, None);
         Ok(Received::Inputs(fresh))
+    }
+
+    /// What the newest packet of a session acknowledged: the tick of a snapshot, 0 for none, and a bit for each before.
+    pub fn acknowledged(&self, id: SessionId) -> (u64, u32) {
+        match self.slots.get(usize::from(id.slot)) {
+            Some(Slot::Taken(session)) if session.epoch == id.epoch => session.acknowledged,
+            _ => (0, 0),
+        }
     }
 
     /// The session's liveliness token is there, perhaps again.

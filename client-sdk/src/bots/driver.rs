@@ -96,7 +96,7 @@ impl Driver {
     fn controls(&mut self) -> Controls {
         let Some(snapshot) = self.session.latest_snapshot() else { return Controls::default() };
         let roster = self.session.roster();
-        let Ok(Some(view)) = View::of(&snapshot, &roster, self.actor) else { return Controls::default() };
+        let Some(view) = View::of(&snapshot, &roster, self.actor) else { return Controls::default() };
         self.measure(view.own.position);
         let wanted = self.script.drive(&view, snapshot.tick());
         self.recovery.drive(&view.own, wanted)

@@ -1,10 +1,7 @@
 //! What a script sees: its own car and the others, at one tick.
 
 use glam::{Quat, Vec3};
-use pita_protocol::{
-    WireError,
-    slices::{KIND_RIGID_BODY, PackedSlice},
-};
+use pita_protocol::dof::{Slice, kind};
 
 use crate::{ReceivedSnapshot, Roster};
 
@@ -23,11 +20,11 @@ pub struct Body {
 }
 
 impl Body {
-    fn of(slice: &PackedSlice) -> Option<Self> {
-        if slice.kind != KIND_RIGID_BODY {
+    fn of(slice: &Slice) -> Option<Self> {
+        if slice.kind != kind::RIGID_BODY {
             return None;
         }
-        let mut numbers = slice.q().chain(slice.v());
+        let mut numbers = slice.q.iter().chain(&slice.v).copied();
         let mut next = || numbers.next();
         let position = Vec3::new(next()?, next()?, next()?);
         let rotation = Quat::from_xyzw(next()?, next()?, next()?, next()?).normalize();
@@ -84,21 +81,18 @@ pub struct View<'a> {
 
 impl<'a> View<'a> {
     /// What `snapshot` shows to the driver of `actor`; `None` where the actor is not in it.
-    ///
-    /// # Errors
-    /// Where the snapshot cannot be read.
-    pub fn of(snapshot: &'a ReceivedSnapshot, roster: &'a Roster, actor: u32) -> Result<Option<Self>, WireError> {
-        let Some(root) = roster.root_slice(actor) else { return Ok(None) };
-        let own = snapshot.select(&[root])?.first().and_then(Body::of);
-        Ok(own.map(|own| Self { own, actor, snapshot, roster }))
+    pub fn of(snapshot: &'a ReceivedSnapshot, roster: &'a Roster, actor: u32) -> Option<Self> {
+        let root = roster.root_slice(actor)?;
+        let own = snapshot.select(&[root]).first().and_then(Body::of)?;
+        Some(Self { own, actor, snapshot, roster })
     }
 
-    /// The other cars. Read from the snapshot when asked for; none where it cannot be read.
+    /// The other cars. Read from the snapshot when asked for.
     pub fn others(&self) -> Vec<Body> {
         let cars = self.roster.actors().filter(|actor| actor.kind == VEHICLE && actor.id != self.actor);
         let mut roots: Vec<u32> = cars.filter_map(|actor| Some(actor.parts.first()?.slice)).collect();
         roots.sort_unstable();
-        let slices = self.snapshot.select(&roots).unwrap_or_default();
+        let slices = self.snapshot.select(&roots);
         slices.iter().filter_map(Body::of).collect()
     }
 }

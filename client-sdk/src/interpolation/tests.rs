@@ -1,7 +1,6 @@
 //! Tests of the interpolation buffer, without any network.
 
 use super::*;
-use pita_protocol::slices::KIND_PARTICLE;
 use proptest::prelude::*;
 
 const PERIOD_S: f64 = 1.0 / 30.0;
@@ -12,13 +11,13 @@ fn buffer(frames_max: usize) -> InterpolationBuffer {
 }
 
 fn particle(id: u32, x: f32, v: f32) -> Slice {
-    Slice { id, kind: KIND_PARTICLE, q: vec![x, 0.0, 0.0], v: vec![v, 0.0, 0.0] }
+    Slice { id, kind: kind::PARTICLE, q: vec![x, 0.0, 0.0], v: vec![v, 0.0, 0.0] }
 }
 
 fn body(rotation: Quat, spin: Vec3) -> Slice {
     let q = [0.0, 1.0, 0.0].into_iter().chain(rotation.to_array()).collect();
     let v = [0.0; 3].into_iter().chain(spin.to_array()).collect();
-    Slice { id: 1, kind: KIND_RIGID_BODY, q, v }
+    Slice { id: 1, kind: kind::RIGID_BODY, q, v }
 }
 
 fn rotation_at(buffer: &InterpolationBuffer, tick: f64) -> Quat {
@@ -73,7 +72,7 @@ proptest! {
     ) {
         let mut buffer = buffer(4);
         for (tick, n) in [(0, a), (3, b)] {
-            let slice = Slice { id: 1, kind: KIND_RIGID_BODY, q: n[..7].to_vec(), v: n[7..].to_vec() };
+            let slice = Slice { id: 1, kind: kind::RIGID_BODY, q: n[..7].to_vec(), v: n[7..].to_vec() };
             buffer.insert(Frame { tick, slices: vec![slice] });
         }
         let slices = buffer.sample(tick).unwrap();

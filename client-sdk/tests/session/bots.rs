@@ -40,7 +40,7 @@ pub fn run_world(server: Arc<FakeServer>, slots: u16, step: f32) -> tokio::task:
         for tick in 101u64.. {
             ticks.tick().await;
             for slot in SLOT..SLOT + slots {
-                let dof = fake_server::car(10 * u32::from(slot), (tick - 100) as f32 * step);
+                let dof = fake_server::car(10 * u32::from(slot), tick, (tick - 100) as f64 * f64::from(step));
                 let ack = ack((tick - 101) as u32, tick);
                 let snapshot = Snapshot { epoch: EPOCH, tick, ack, event_sequence: EVENTS_BEFORE, dof };
                 let key = format!("pita/{}/snapshot/{slot}", fake_server::ARENA);

@@ -11,13 +11,14 @@ use std::{
 
 use pita_client::{ActorDescription, Description, Event};
 use pita_protocol::{
-    Keys, encode,
+    Keys,
+    dof::{Encoder, Group, Precision, State, kind},
+    encode,
     message::{
         EventMessage, FATES_MAX, InputAck, InputFate, InputPacket, JoinAccepted, JoinReply, JoinRequest,
         PartDescription, Role, Shape, Snapshot, Status,
     },
     seal::{SessionKey, open},
-    slices::{KIND_RIGID_BODY, pack},
 };
 use tokio::sync::{Mutex as AsyncMutex, mpsc};
 use zenoh::{
@@ -229,15 +230,15 @@ pub fn actor(id: u32) -> ActorDescription {
 
 /// The own car of the first session at `x = tick − 100` m.
 pub fn snapshot(tick: u64) -> Snapshot {
-    let x = tick as f32 - 100.0;
-    Snapshot { epoch: EPOCH, tick, ack: InputAck::default(), event_sequence: EVENTS_BEFORE, dof: car(ROOT, x) }
+    let x = tick as f64 - 100.0;
+    Snapshot { epoch: EPOCH, tick, ack: InputAck::default(), event_sequence: EVENTS_BEFORE, dof: car(ROOT, tick, x) }
 }
 
-/// One rigid body at `x`, 30 m/s fast along it.
-pub fn car(slice: u32, x: f32) -> Vec<u8> {
-    let mut dof = Vec::new();
-    let q = [x, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0];
-    let v = [30.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-    pack(slice, KIND_RIGID_BODY, q.into_iter(), v.into_iter(), &mut dof);
-    dof
+/// One rigid body at `x`, 30 m/s fast along it, in a snapshot that needs nothing before it.
+pub fn car(slice: u32, tick: u64, x: f64) -> Vec<u8> {
+    let mut state = State::new(Precision::default()).unwrap();
+    let layout = [Group::Point, Group::Rotation, Group::Rate, Group::Rate];
+    let numbers = [x, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0, 30.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    state.push(slice, kind::RIGID_BODY, None, &layout, &numbers).unwrap();
+    Encoder::default().encode(tick, &state, &[])
 }

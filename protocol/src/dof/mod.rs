@@ -13,21 +13,29 @@
 //!
 //! Kinds of bodies, by [`Body::kind`], are the [`kind`]s below. Whatever the kind, a body is a row of [`Group`]s.
 
+mod cells;
 mod frame;
+#[cfg(test)]
+mod golden;
 mod model;
 mod predict;
+mod priority;
 mod quantise;
 mod quaternion;
 mod range_coder;
 mod residual;
+mod slice;
 mod stream;
 #[cfg(test)]
 mod tests;
 mod walk;
 
+pub use cells::{Cadence, CellEncoder};
 pub use frame::{BODIES_MAX, Body, Frame, GROUPS_MAX, State};
 pub use predict::GroupState;
+pub use priority::{Priorities, Relevance};
 pub use quantise::{Group, Precision, Quantised, absolute, relative, rotate};
+pub use slice::Slice;
 pub use stream::{Decoder, Encoder, HISTORY};
 
 /// What the numbers of a body mean.

@@ -69,10 +69,14 @@ impl GroupState {
         Self { value, fitted: 1, offset: [0; 3], rate: [0; 3], errors: [16; GUESSES] }
     }
 
-    /// Velocity along the track: steps a tick, or rad a tick.
-    pub fn rate(&self) -> [f64; 3] {
-        let unit = if self.value.group == Group::Rotation { RADIANS } else { FRACTION };
-        self.rate.map(|r| f64::from(r) / f64::from(1u32 << unit))
+    /// Rates along the track, per second: of each number, of a rotation the angular velocity in the axes of its world.
+    pub fn rate(&self, precision: &Precision, tick_hz: f64) -> impl Iterator<Item = f64> {
+        let group = self.value.group;
+        let unit = match group {
+            Group::Rotation => tick_hz / f64::from(1u32 << RADIANS),
+            _ => tick_hz / f64::from(1u32 << FRACTION) / precision.steps(group),
+        };
+        self.rate.into_iter().take(group.components()).map(move |rate| f64::from(rate) * unit)
     }
 
     /// The error of the guess that it goes by, of 16 to a step.

@@ -65,7 +65,7 @@ impl Precision {
         require((64..=8192).contains(&self.rotation), "rotation steps", "64 to 8192")
     }
 
-    fn steps(&self, group: Group) -> f64 {
+    pub(super) fn steps(&self, group: Group) -> f64 {
         f64::from(match group {
             Group::Point => self.point,
             Group::Rotation => self.rotation,

@@ -11,6 +11,7 @@
 //! An [`Encoder`] codes against nothing that was not acknowledged. So a lost, late or repeated snapshot harms no other.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use super::frame::{Frame, State};
 use super::quantise::Precision;
@@ -74,6 +75,39 @@ impl Encoder {
         bytes
     }
 
+    /// Codes the snapshot of `tick` into about `budget` bytes: bodies with the highest `priority` first, those that are
+    /// left out keep the state that they had. Answers which bodies of the state were carried, too.
+    ///
+    /// # Panics
+    /// As [`Self::encode`].
+    pub fn encode_within(
+        &mut self,
+        tick: u64,
+        state: &State,
+        budget: usize,
+        priority: impl Fn(u32) -> f32,
+    ) -> (Vec<u8>, Vec<bool>) {
+        let mut order: Vec<_> = state.bodies().iter().enumerate().map(|(i, b)| (priority(b.id), i)).collect();
+        order.sort_by(|(a, i), (b, j)| b.total_cmp(a).then(i.cmp(j)));
+        let mut count = order.len();
+        loop {
+            let mut chosen = vec![count == order.len(); order.len()];
+            order.iter().take(count).for_each(|&(_, i)| chosen[i] = true);
+            let bytes = self.encode(tick, state, &chosen);
+            if bytes.len() <= budget || count == 0 {
+                return (bytes, chosen);
+            }
+            self.forget_last();
+            // In proportion, and a little less, so that a few rounds suffice.
+            count = (count * budget * 9 / (bytes.len() * 10)).min(count - 1);
+        }
+    }
+
+    /// Forgets the snapshot that was coded last: it is not sent, or nothing will build on it.
+    pub(super) fn forget_last(&mut self) {
+        self.sent.pop_back();
+    }
+
     /// The frame that was coded last.
     pub fn last(&self) -> Option<&Frame> {
         self.sent.back().map(|(frame, _)| frame)
@@ -120,7 +154,7 @@ fn encode_against(base: Option<&Frame>, earlier: Option<&Frame>, tick: u64, sour
 #[derive(Debug, Default)]
 pub struct Decoder {
     /// Oldest first.
-    had: VecDeque<Frame>,
+    had: VecDeque<Arc<Frame>>,
 }
 
 impl Decoder {
@@ -130,7 +164,7 @@ impl Decoder {
     /// [`WireError::Malformed`] and [`WireError::Content`] for what no encoder writes, [`WireError::NoBaseline`] where
     /// this side does not have what the snapshot is coded against, [`WireError::Desync`] where the states differ. After
     /// an error all is as before.
-    pub fn decode(&mut self, tick: u64, bytes: &[u8]) -> Result<&Frame, WireError> {
+    pub fn decode(&mut self, tick: u64, bytes: &[u8]) -> Result<&Arc<Frame>, WireError> {
         require(bytes.len() <= SNAPSHOT_MAX, "snapshot", "at most 1 MiB")?;
         let mut header = Header { bytes };
         let [flags] = header.take()?;
@@ -171,12 +205,12 @@ impl Decoder {
 
     /// The newest frame.
     pub fn newest(&self) -> Option<&Frame> {
-        self.had.back()
+        self.had.back().map(Arc::as_ref)
     }
 
     /// What is to be acknowledged: the newest tick, and a bit for each of the 32 before it. `None` before the first.
     pub fn acknowledgement(&self) -> Option<(u64, u32)> {
-        let newest = self.had.back()?.tick;
+        let newest = self.newest()?.tick;
         let ages = self.had.iter().map(|frame| newest - frame.tick).filter(|age| (1..=32).contains(age));
         Some((newest, ages.fold(0, |bits, age| bits | 1 << (age - 1))))
     }
@@ -187,7 +221,8 @@ impl Decoder {
         Ok(&self.had[at])
     }
 
-    fn keep(&mut self, frame: Frame) -> &Frame {
+    fn keep(&mut self, frame: Frame) -> &Arc<Frame> {
+        let frame = Arc::new(frame);
         let at = match self.had.binary_search_by_key(&frame.tick, |had| had.tick) {
             Ok(at) => {
                 self.had[at] = frame;

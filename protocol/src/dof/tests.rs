@@ -180,6 +180,57 @@ fn bodies_that_are_left_out_keep_their_older_state_until_they_are_sent() {
 }
 
 #[test]
+fn a_budget_is_kept_and_all_bodies_arrive_in_the_end() {
+    let mut toys = Toys::new(21, 2000);
+    let (mut encoder, mut decoder) = (Encoder::default(), Decoder::default());
+    let mut priorities = Priorities::default();
+    for tick in 1..200 {
+        toys.step();
+        let state = toys.state();
+        for body in state.bodies() {
+            priorities.wait(body.id, &Relevance { distance: 10.0, speed: 1.0, is_own: false, importance: 1.0 });
+        }
+        let (snapshot, chosen) = encoder.encode_within(tick, &state, 600, |id| priorities.of(id));
+        assert!(snapshot.len() <= 600, "{} bytes", snapshot.len());
+        state.bodies().iter().zip(&chosen).filter(|(_, sent)| **sent).for_each(|(body, _)| priorities.sent(body.id));
+        decoder.decode(tick, &snapshot).unwrap();
+        encoder.acknowledge(tick, u32::MAX);
+    }
+    assert_eq!(decoder.newest().unwrap().bodies().len(), 2000);
+}
+
+#[test]
+fn a_cell_survives_loss_and_newcomers_catch_up_by_its_epoch() {
+    let mut toys = Toys::new(31, 60);
+    let mut dice = Dice(5);
+    let mut encoder = CellEncoder::new(Cadence::default());
+    let (mut decoder, mut decoded, mut asked) = (Decoder::default(), 0, 0);
+    for tick in 1..400 {
+        toys.step();
+        let state = toys.state();
+        let snapshot = encoder.encode(tick, &state);
+        if dice.roll(10) == 0 {
+            continue;
+        }
+        match decoder.decode(tick, &snapshot) {
+            Ok(frame) => {
+                assert_eq!(known(frame), told(&state));
+                decoded += 1;
+            }
+            Err(error) => {
+                assert_eq!(error, WireError::NoBaseline);
+                asked += 1;
+                decoder = Decoder::default();
+                for (tick, snapshot) in encoder.epoch() {
+                    decoder.decode(tick, snapshot).unwrap();
+                }
+            }
+        }
+    }
+    assert!(decoded > 300 && asked < 30, "{decoded} decoded, {asked} times asked");
+}
+
+#[test]
 fn what_rests_costs_next_to_nothing() {
     let toys = Toys::new(8, 1000);
     let state = toys.state();

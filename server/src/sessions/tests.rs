@@ -18,7 +18,7 @@ fn secrets(epoch: u32) -> Secrets {
 fn packet(epoch: u32, sequences: &[u32]) -> InputPacket {
     let frames =
         sequences.iter().map(|&sequence| InputFrame { sequence, tick: 0, controls: Controls::default() }).collect();
-    InputPacket { epoch, snapshot_tick: 0, leave: false, frames }
+    InputPacket { epoch, snapshot_tick: 0, snapshots_before: 0, leave: false, frames }
 }
 
 fn taken(sessions: &mut Sessions) -> Vec<Change> {

@@ -6,6 +6,7 @@
 mod peers;
 mod solvers;
 mod tick;
+mod wire;
 
 use std::path::PathBuf;
 
@@ -25,6 +26,11 @@ pub const ENTRIES: &[Entry] = &[
         name: "solvers",
         measures: "which method is best: work and time of every solver and preconditioner; minutes",
         run: solvers::run,
+    },
+    Entry {
+        name: "wire",
+        measures: "bytes, time and error of the coded state beside published figures, without and with loss",
+        run: wire::run,
     },
 ];
 

@@ -30,8 +30,8 @@ pub async fn next_snapshot(session: &Session) -> Arc<ReceivedSnapshot> {
 /// Where an actor is in a snapshot, m.
 pub fn position(session: &Session, snapshot: &ReceivedSnapshot, actor: u32) -> Option<[f32; 3]> {
     let root = session.roster().root_slice(actor)?;
-    let slices = snapshot.slices().unwrap_or_else(|error| panic!("{error}"));
-    let slice = slices.into_iter().find(|slice| slice.id == root)?;
+    let slices = snapshot.select(&[root]);
+    let slice = slices.first()?;
     Some([slice.q[0], slice.q[1], slice.q[2]])
 }
 

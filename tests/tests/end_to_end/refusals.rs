@@ -4,7 +4,7 @@ use pita_protocol::message::{
     Controls, InputFrame, InputPacket, JoinAccepted, JoinReply, JoinRequest, Refusal, RefusedCounts, Role,
 };
 use pita_protocol::seal::TAG_BYTES;
-use pita_protocol::{decode, encode};
+use pita_protocol::{PROTOCOL_VERSION, decode, encode};
 use pita_tests::observer::Observer;
 
 use crate::clients::{ahead, connect, next_snapshot};
@@ -17,10 +17,12 @@ async fn joins_that_cannot_be_are_refused_in_words_and_counted() {
     let mut other_version = request.clone();
     other_version[0] += 1;
     let reply = join(&observer, other_version).await;
-    assert!(matches!(reply, JoinReply::Refused(Refusal::Version { server: 1, client: 2 })), "{reply:?}");
+    let expected = Refusal::Version { server: PROTOCOL_VERSION, client: PROTOCOL_VERSION + 1 };
+    assert!(matches!(&reply, JoinReply::Refused(refusal) if *refusal == expected), "{reply:?}");
 
     let nameless = encode(&JoinRequest { name: "\n".into(), role: Role::Player, resume: None });
-    let malformed = [Vec::new(), vec![1, 1, 255, 255], request[..4].to_vec(), vec![1; 5000], nameless];
+    let malformed =
+        [Vec::new(), vec![PROTOCOL_VERSION as u8, 1, 255, 255], request[..4].to_vec(), vec![1; 5000], nameless];
     let malformed_count = malformed.len() as u64;
     for bytes in malformed {
         let reply = join(&observer, bytes.clone()).await;
@@ -111,7 +113,7 @@ impl<'a> Mallory<'a> {
 
     fn unsealed(&self, sequence: u32, controls: Controls) -> InputPacket {
         let frames = vec![InputFrame { sequence, tick: self.joined.description.tick, controls }];
-        InputPacket { epoch: self.joined.epoch, snapshot_tick: 0, leave: false, frames }
+        InputPacket { epoch: self.joined.epoch, snapshot_tick: 0, snapshots_before: 0, leave: false, frames }
     }
 
     fn packet(&self, sequence: u32, controls: Controls) -> Vec<u8> {

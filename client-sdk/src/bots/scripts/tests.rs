@@ -4,8 +4,8 @@ use std::{sync::Arc, time::Instant};
 
 use glam::{Quat, Vec3};
 use pita_protocol::{
+    dof::{Decoder, Encoder, Group, Precision, State, kind},
     message::{ActorDescription, Description, InputAck, PartDescription, Shape, Snapshot},
-    slices::{KIND_RIGID_BODY, pack},
 };
 
 use super::*;
@@ -60,15 +60,18 @@ fn roster(count: u32) -> Roster {
 }
 
 fn snapshot(tick: u64, cars: &[Car]) -> ReceivedSnapshot {
-    let mut dof = Vec::new();
+    let mut state = State::new(Precision::default()).unwrap();
     for (car, id) in cars.iter().zip(0..) {
         let rotation = Quat::from_rotation_y(car.heading).to_array();
-        let q: Vec<f32> = car.position.to_array().into_iter().chain(rotation).collect();
-        let v: Vec<f32> = car.velocity().to_array().into_iter().chain([0.0; 3]).collect();
-        pack(10 * id, KIND_RIGID_BODY, q.into_iter(), v.into_iter(), &mut dof);
+        let q = car.position.to_array().into_iter().chain(rotation);
+        let numbers: Vec<_> = q.chain(car.velocity().to_array()).chain([0.0; 3]).map(f64::from).collect();
+        let layout = [Group::Point, Group::Rotation, Group::Rate, Group::Rate];
+        state.push(10 * id, kind::RIGID_BODY, None, &layout, &numbers).unwrap();
     }
+    let dof = Encoder::default().encode(tick, &state, &[]);
+    let frame = Arc::clone(Decoder::default().decode(tick, &dof).unwrap());
     let head = Snapshot { epoch: 0, tick, ack: InputAck::default(), event_sequence: 0, dof };
-    ReceivedSnapshot::new(head, Instant::now(), Arc::default())
+    ReceivedSnapshot::new(head, frame, 30.0, Instant::now())
 }
 
 /// Lets every car be driven for `ticks` and shows each state to `watch`.
@@ -77,7 +80,7 @@ fn drive(mut cars: Vec<Car>, mut scripts: Vec<Box<dyn Script>>, ticks: u64, mut 
     for tick in 1..=ticks {
         let snapshot = snapshot(tick, &cars);
         for ((car, script), id) in cars.iter_mut().zip(&mut scripts).zip(0..) {
-            let view = View::of(&snapshot, &roster, id).unwrap().unwrap();
+            let view = View::of(&snapshot, &roster, id).unwrap();
             car.step(&script.drive(&view, tick));
         }
         watch(&cars);
