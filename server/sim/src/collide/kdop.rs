@@ -133,28 +133,37 @@ impl<const H: usize> Kdop<H>
 where
     Slabs: Directions<H>,
 {
+    /// Where it is for all: a copy for every use costs more than what is done with it.
+    const AXES: &'static [DVec3; H] = &Slabs::AXES;
+
     /// The bound of what reaches from `interval(axis).0` to `interval(axis).1` along every axis: of a support map.
     #[inline]
     pub fn of_intervals(interval: impl Fn(DVec3) -> (f64, f64)) -> Self {
-        let ends = Slabs::AXES.map(interval);
-        Self { min: ends.map(|end| end.0), max: ends.map(|end| end.1) }
+        let mut bound = Self::EMPTY;
+        for (i, &axis) in Self::AXES.iter().enumerate() {
+            (bound.min[i], bound.max[i]) = interval(axis);
+        }
+        bound
     }
 
     /// The bound of points, deforming or not.
     pub fn of_points(points: impl IntoIterator<Item = DVec3>) -> Self {
-        points.into_iter().fold(Self::EMPTY, |bound, point| {
-            bound.union(&Self::of_intervals(|axis| {
+        let mut bound = Self::EMPTY;
+        for point in points {
+            for (i, axis) in Self::AXES.iter().enumerate() {
                 let x = axis.dot(point);
-                (x, x)
-            }))
-        })
+                bound.min[i] = if x < bound.min[i] { x } else { bound.min[i] };
+                bound.max[i] = if x > bound.max[i] { x } else { bound.max[i] };
+            }
+        }
+        bound
     }
 
     /// What it sweeps over on a way of `displacement`, m.
     #[inline]
     pub fn swept(&self, displacement: DVec3) -> Self {
         let mut swept = *self;
-        for (i, axis) in Slabs::AXES.iter().enumerate() {
+        for (i, axis) in Self::AXES.iter().enumerate() {
             let way = axis.dot(displacement);
             swept.min[i] += way.min(0.0);
             swept.max[i] += way.max(0.0);
@@ -165,7 +174,7 @@ where
     /// A distance from `point` that nothing in it is nearer than, m.
     pub fn distance(&self, point: DVec3) -> f64 {
         let beyond = |i: usize| {
-            let x = Slabs::AXES[i].dot(point);
+            let x = Self::AXES[i].dot(point);
             (self.min[i] - x).max(x - self.max[i]).max(0.0)
         };
         let of_box = DVec3::new(beyond(0), beyond(1), beyond(2)).length();

@@ -44,6 +44,8 @@ struct Node {
     children: [u32; 2],
     /// Of a leaf: what it stands for.
     item: u32,
+    /// Of a leaf: whether it left its bounds when it was updated last.
+    is_restless: bool,
     /// Whether a leaf below has changed since [`KdopTree::settle`]; then it is so all the way to the root.
     changed: bool,
     /// [`Kdop::cost`] of its bounds, m².
@@ -56,7 +58,16 @@ struct Node {
 
 impl Node {
     const fn leaf(item: u32) -> Self {
-        Self { parent: NONE, children: [NONE; 2], item, changed: false, surface: 0.0, cost: 0.0, built: 1.0 }
+        Self {
+            parent: NONE,
+            children: [NONE; 2],
+            item,
+            is_restless: false,
+            changed: false,
+            surface: 0.0,
+            cost: 0.0,
+            built: 1.0,
+        }
     }
 
     fn is_leaf(&self) -> bool {
@@ -120,15 +131,17 @@ impl<const H: usize> KdopTree<H> {
     }
 
     /// A leaf's bounds are now within `bounds`. Answers whether that changed the tree: the bounds that it keeps are a
-    /// little wider, and as long as the leaf stays within nothing happens.
+    /// little wider, and as long as the leaf stays within nothing happens. Those of a leaf that leaves them each time would
+    /// be wider for nothing.
     pub fn update(&mut self, Leaf(leaf): Leaf, bounds: &Kdop<H>) -> bool {
-        let kept = &self.bounds[leaf as usize];
-        if kept.contains(bounds) && bounds.grown(LOOSE * FAT).contains(kept) {
-            return false;
+        let (node, kept) = (&mut self.nodes[leaf as usize], &mut self.bounds[leaf as usize]);
+        let leaves = !(kept.contains(bounds) && bounds.grown(LOOSE * FAT).contains(kept));
+        let was_restless = std::mem::replace(&mut node.is_restless, leaves);
+        if leaves {
+            *kept = if was_restless { *bounds } else { bounds.grown(FAT) };
+            self.mark(leaf);
         }
-        self.bounds[leaf as usize] = bounds.grown(FAT);
-        self.mark(leaf);
-        true
+        leaves
     }
 
     /// Brings everything above leaves that changed up to date: O(log n) for each.

@@ -5,6 +5,8 @@ use super::{KdopTree, NONE, Node};
 /// A search for pairs; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub struct PairSearch {
+    /// Inner nodes, or an inner node and another, whose bounds overlap and below which something has changed; a node with
+    /// itself.
     stack: Vec<[u32; 2]>,
 }
 
@@ -16,11 +18,12 @@ impl PairSearch {
         self.stack.extend(Some([tree.root; 2]).filter(|_| tree.root != NONE));
         while let Some([a, b]) = self.stack.pop() {
             if a != b {
-                self.step([tree, tree], [a, b], &mut found);
+                self.open([tree, tree], [a, b], &mut found);
             } else if let Node { changed: true, children: [left, right], .. } = tree.nodes[a as usize]
                 && left != NONE
             {
-                self.stack.extend([[left, left], [right, right], [left, right]]);
+                self.stack.extend([[left, left], [right, right]]);
+                self.meet([tree, tree], [left, right], &mut found);
             }
         }
     }
@@ -28,26 +31,37 @@ impl PairSearch {
     /// As [`PairSearch::within`], for pairs of a leaf of `a` and one of `b`.
     pub fn between<const H: usize>(&mut self, a: &KdopTree<H>, b: &KdopTree<H>, mut found: impl FnMut(u32, u32)) {
         self.stack.clear();
-        self.stack.extend(Some([a.root, b.root]).filter(|roots| !roots.contains(&NONE)));
+        if ![a.root, b.root].contains(&NONE) {
+            self.meet([a, b], [a.root, b.root], &mut found);
+        }
         while let Some(pair) = self.stack.pop() {
-            self.step([a, b], pair, &mut found);
+            self.open([a, b], pair, &mut found);
         }
     }
 
-    /// Two different nodes: apart, a pair, or the larger one is opened.
+    /// Two nodes that may be apart: what is not is a pair, or to be opened.
     #[inline]
-    fn step<const H: usize>(&mut self, [a, b]: [&KdopTree<H>; 2], pair: [u32; 2], found: &mut impl FnMut(u32, u32)) {
+    fn meet<const H: usize>(&mut self, [a, b]: [&KdopTree<H>; 2], pair: [u32; 2], found: &mut impl FnMut(u32, u32)) {
         let [i, j] = pair.map(|node| node as usize);
         let (first, second) = (&a.nodes[i], &b.nodes[j]);
         if !(first.changed | second.changed) || !a.bounds[i].overlaps(&b.bounds[j]) {
             return;
         }
-        match (first.is_leaf(), second.is_leaf()) {
-            (true, true) => found(first.item, second.item),
-            (open, other) if other || (!open && first.surface > second.surface) => {
-                self.stack.extend(first.children.map(|child| [child, pair[1]]));
-            }
-            _ => self.stack.extend(second.children.map(|child| [pair[0], child])),
+        if first.is_leaf() && second.is_leaf() {
+            found(first.item, second.item);
+        } else {
+            self.stack.push(pair);
+        }
+    }
+
+    /// The children of the larger of two nodes meet the other one.
+    #[inline]
+    fn open<const H: usize>(&mut self, trees: [&KdopTree<H>; 2], pair: [u32; 2], found: &mut impl FnMut(u32, u32)) {
+        let (first, second) = (&trees[0].nodes[pair[0] as usize], &trees[1].nodes[pair[1] as usize]);
+        if second.is_leaf() || (!first.is_leaf() && first.surface > second.surface) {
+            first.children.into_iter().for_each(|child| self.meet(trees, [child, pair[1]], found));
+        } else {
+            second.children.into_iter().for_each(|child| self.meet(trees, [pair[0], child], found));
         }
     }
 }
