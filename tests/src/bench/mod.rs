@@ -3,6 +3,7 @@
 //! Owns the list of entries and how their results are shown. An entry measures and answers a [`Report`]; it prints
 //! nothing, and where it compares with a peer, the peer runs in the same process and the same run.
 
+mod broadphase;
 mod peers;
 mod solvers;
 mod tick;
@@ -17,6 +18,11 @@ use crate::table::table;
 /// Every measurement, in the order in which they run.
 pub const ENTRIES: &[Entry] = &[
     Entry { name: "tick", measures: "a tick of 16 driven cars: ms a stage, iterations, allocations", run: tick::run },
+    Entry {
+        name: "broadphase",
+        measures: "k-DOP trees of several k beside parry's tree of boxes and others: time, pairs, false pairs",
+        run: broadphase::run,
+    },
     Entry {
         name: "peers",
         measures: "ours and rapier in turn on the yardstick's scenes: ms, ratio, quality; minutes",
