@@ -30,7 +30,8 @@ pub fn cubes(ticks: usize) -> Result<Trace, EntryError> {
     let mut target = DVec3::ZERO;
     let mut trace = Trace { tick_hz: 60, precision: FIEDLER, ticks: Vec::new() };
     for tick in 0..WARM_UP_TICKS + ticks {
-        if tick % 90 == 0 {
+        let arrived = world.position(bodies[0]).is_none_or(|at| at.distance(target) < 4.0);
+        if arrived || tick % 90 == 0 {
             target = DVec3::new(random.random_range(-13.0..13.0), 0.0, random.random_range(-13.0..13.0));
         }
         roll(&mut world, &bodies, target)?;
@@ -60,7 +61,7 @@ fn roll(world: &mut World, bodies: &[BodyId], target: DVec3) -> Result<(), Entry
     Ok(())
 }
 
-/// 250 bodies that drift about a planetoid, bounce off it and off each other, and change their speed towards random
+/// 250 cubes of 1 to 1.4 m that drift about a planetoid, bounce off it and off each other, and change their speed towards random
 /// targets every few seconds; weightless, within a sphere of 25 m.
 pub fn asteroids(ticks: usize) -> Result<Trace, EntryError> {
     const WARM_UP_TICKS: usize = 90;
@@ -78,7 +79,7 @@ pub fn asteroids(ticks: usize) -> Result<Trace, EntryError> {
         let at = direction(&mut random) * 25.0;
         let is_free = bodies.iter().all(|&other| world.position(other).is_some_and(|p| p.distance(at) > 2.0));
         if is_free && (8.0..24.0).contains(&at.length()) {
-            let half = DVec3::splat(0.6) + direction(&mut random) * 0.1;
+            let half = DVec3::splat(random.random_range(0.5..0.7));
             let body = add_box(&mut world, half, at, 8.0 * half.element_product(), rock)?;
             world.set_velocity(body, direction(&mut random) * 3.0, direction(&mut random))?;
             bodies.push(body);
@@ -101,12 +102,12 @@ pub fn asteroids(ticks: usize) -> Result<Trace, EntryError> {
     Ok(trace)
 }
 
-/// Accelerates a body to `speed` along its way, at most 1 m/s², and back into the sphere.
+/// Accelerates a body to `speed` along its way, at most 0.5 m/s², and back into the sphere.
 fn drift(world: &mut World, body: BodyId, speed: f64) -> Result<(), EntryError> {
     let (Some(at), Some(velocity), Some(mass)) = (world.position(body), world.velocity(body), world.mass(body)) else {
         return Ok(());
     };
-    let missing = (speed - velocity.length()).clamp(-0.5, 0.5) * 2.0;
+    let missing = (speed - velocity.length()).clamp(-0.5, 0.5);
     let outside = (at.length() - 25.0).max(0.0);
     let ahead = velocity.try_normalize().unwrap_or(DVec3::X) * missing;
     world.apply_force(body, (ahead - at.normalize_or_zero() * outside * 6.0) * mass, at)?;
