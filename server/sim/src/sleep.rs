@@ -1,7 +1,7 @@
 //! Sleep: an island that has been still for a while leaves the tick until something wakes it.
 //!
-//! Owns what stillness is, and the groups that sleep and wake together. What sleeping means to lists, trees and potentials is
-//! for [`World`](crate::World) to do.
+//! Owns what stillness is, and the groups that sleep and wake together. What sleeping means to lists, trees and
+//! potentials is for [`World`](crate::World) to do.
 
 use glam::DVec3;
 use slab::Slab;

@@ -141,8 +141,8 @@ impl ContactPoint {
     }
 }
 
-/// Slabs of the engine's k-DOPs: k = 26. `pita-bench broadphase`: what its bounds cost more than those of 14 or 18, they save many
-/// times over in pairs that the fine phase need not look at.
+/// Slabs of the engine's k-DOPs: k = 26. What its bounds cost more than those of 14 or 18 they save many times over in
+/// pairs that the fine phase need not look at (`pita-bench broadphase`).
 const SLABS: usize = 13;
 
 /// What bounds a hull, or a piece of static geometry.

@@ -187,7 +187,8 @@ impl Probe {
         Self { at, point, fine_phase: NarrowPhase::default() }
     }
 
-    /// Distance from the point to a collider, negative inside, and the unit vector out of its surface; `None` beyond `within`.
+    /// Distance from the point to a collider, negative inside, and the unit vector out of its surface; `None` beyond
+    /// `within`.
     fn distance(&mut self, to: &Candidate, within: f64) -> Option<(f64, DVec3)> {
         let at = self.at;
         self.distance_at(at, to, within)
@@ -204,8 +205,8 @@ impl Probe {
         Some((found.gap, -found.normal)).filter(|&(distance, _)| distance <= within)
     }
 
-    /// How far a ray along the unit vector `direction` gets to a collider, and the normal of the surface there. Every step goes to the plane
-    /// that tells the ray's end from the shape: never through the surface, and in a few steps to it.
+    /// How far a ray along the unit vector `direction` gets to a collider, and the normal of the surface there. Every step
+    /// goes to the plane that tells the ray's end from the shape: never through the surface, and in a few steps to it.
     fn ray(&mut self, to: &Candidate, direction: DVec3, length: f64) -> Option<(f64, DVec3)> {
         let mut way = 0.0;
         for _ in 0..STEPS_MAX {

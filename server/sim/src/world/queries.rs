@@ -26,7 +26,8 @@ impl World {
         Ok(self.detector.ray_cast(self.looked_up(), [origin, direction.normalize()], length, filter))
     }
 
-    /// Everything that overlaps a shape: bodies, each once, then static geometry, both in the order in which they were added.
+    /// Everything that overlaps a shape: bodies, each once, then static geometry, both in the order in which they were
+    /// added.
     ///
     /// # Errors
     /// [`SimError`] for a value out of range, or a half-space.

@@ -192,7 +192,7 @@ fn controls_wake() {
     assert!(bodies.iter().all(|&id| !world.is_asleep(id)));
 }
 
-/// A plank on a hinge with a crate on either side: sleeps in balance; without one of the crates it tips.
+/// A plank on a hinge with a crate on either side, put to sleep in balance: without one of the crates it tips.
 #[test]
 fn a_seesaw_wakes_when_one_side_is_taken() {
     let mut world = world();
@@ -202,7 +202,6 @@ fn a_seesaw_wakes_when_one_side_is_taken() {
     let hinge = world.add_hinge(hinge).unwrap();
     let sides = [-2.0, 2.0]
         .map(|x| body(&mut world, Shape::Box { half: DVec3::splat(0.3) }, 20.0, DVec3::new(x, 1.9, 0.0), 0.8));
-    // A little friction of the hinge's own holds the balance.
     world.add_angle_limit(AngleLimitDesc::new(hinge, -1.0, 1.0)).unwrap();
     run(&mut world, 40);
     let balanced = [plank, sides[0], sides[1]];

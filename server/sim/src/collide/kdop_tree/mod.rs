@@ -1,9 +1,9 @@
 //! Binary trees of k-DOPs: which of many bounds overlap.
 //!
-//! Owns nodes in one arena, their bounds and links; knows items by number alone. Leaves come, go and move; [`KdopTree::refit`]
-//! brings the bounds above what changed up to date and builds anew what has gone bad; then the tree may be asked, with
-//! itself, with another tree (`pairs`), by bounds, rays and points (`query`). What a search finds depends on the bounds of the
-//! leaves alone, never on the shape of the tree. Once warm nothing allocates.
+//! Owns nodes in one arena, their bounds and links; knows items by number alone. Leaves come, go and move;
+//! [`KdopTree::refit`] brings the bounds above what changed up to date and builds anew what has gone bad; then the tree
+//! may be asked, with itself, with another tree (`pairs`), by bounds, rays and points (`query`). What a search finds
+//! depends on the bounds of the leaves alone, never on the shape of the tree. Once warm nothing allocates.
 
 mod build;
 mod pairs;

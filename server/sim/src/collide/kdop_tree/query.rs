@@ -13,8 +13,8 @@ impl<const H: usize> KdopTree<H> {
         self.visit(|kept| kept.overlaps(bounds), &mut found);
     }
 
-    /// Hands `hit` the items of all leaves whose bounds a ray from `origin` along the unit vector `direction` meets within
-    /// its length, in no order. What `hit` answers is the ray's length from then on, m.
+    /// Hands `hit` the items of all leaves whose bounds a ray from `origin` along the unit vector `direction` meets
+    /// within its length, in no order. What `hit` answers is the ray's length from then on, m.
     pub fn cast(&self, origin: DVec3, direction: DVec3, length: f64, mut hit: impl FnMut(u32) -> f64)
     where
         Slabs: Directions<H>,
@@ -24,8 +24,8 @@ impl<const H: usize> KdopTree<H> {
         self.visit(|kept| kept.is_hit(&ray, limit.get()), &mut |item| limit.set(hit(item)));
     }
 
-    /// Hands `near` the items of all leaves that may be nearer to `point` than `distance`, in no order. What `near` answers is
-    /// the distance from then on, m.
+    /// Hands `near` the items of all leaves that may be nearer to `point` than `distance`, in no order. What `near`
+    /// answers is the distance from then on, m.
     pub fn nearest(&self, point: DVec3, distance: f64, mut near: impl FnMut(u32) -> f64)
     where
         Slabs: Directions<H>,

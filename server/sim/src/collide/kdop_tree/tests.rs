@@ -175,7 +175,8 @@ proptest! {
     }
 }
 
-/// What drives through a crowd does not leave long bounds behind, and a crowd that comes one by one makes no list of the tree.
+/// What drives through a crowd does not leave long bounds behind, and a crowd that comes one by one makes no list of the
+/// tree.
 #[test]
 fn degraded_subtrees_are_built_anew() {
     let place = |i: u32| DVec3::new(f64::from(i % 40), 0.0, f64::from(i / 40));
