@@ -70,6 +70,7 @@ impl State {
         numbers: &[f64],
     ) -> Result<(), WireError> {
         require(self.bodies.last().is_none_or(|last| last.id < id), "slice id", "ascending")?;
+        require(id < u32::MAX, "slice id", "below 2^32 - 1")?;
         require(parent.is_none_or(|parent| self.find(parent).is_some()), "parent", "an earlier body")?;
         require(self.bodies.len() < BODIES_MAX, "bodies", "at most 16384")?;
         require(self.groups.len() + layout.len() <= GROUPS_MAX, "groups", "at most 65536")?;

@@ -325,6 +325,23 @@ fn hostile_bytes_are_errors_and_no_more() {
 }
 
 #[test]
+fn a_full_stream_may_change_as_a_whole() {
+    let (mut encoder, mut decoder) = (Encoder::default(), Decoder::default());
+    for tick in 1..4u32 {
+        let mut state = State::new(Precision::default()).unwrap();
+        let ids = (0..BODIES_MAX as u32).map(|i| u32::MAX - 1 - 3 * BODIES_MAX as u32 + tick * BODIES_MAX as u32 - i);
+        for id in ids.rev().filter(|&id| id < u32::MAX) {
+            state.push(id, kind::PARTICLE, None, &[Group::Point], &[f64::from(tick), 0.0, 0.0]).unwrap();
+        }
+        let snapshot = encoder.encode(tick.into(), &state, &[]);
+        assert_eq!(known(decoder.decode(tick.into(), &snapshot).unwrap()), told(&state));
+        encoder.acknowledge(tick.into(), 0);
+    }
+    let refused = State::new(Precision::default()).unwrap().push(u32::MAX, 0, None, &[Group::Point], &[0.0; 3]);
+    assert!(matches!(refused, Err(WireError::Content { field: "slice id", .. })), "{refused:?}");
+}
+
+#[test]
 fn quantisation_keeps_its_bounds() {
     let mut dice = Dice(7);
     let precision = Precision { point: 1000, rotation: 1500, scalar: 1000, rate: 200 };

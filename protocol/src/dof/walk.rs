@@ -64,7 +64,7 @@ impl<C: Coder> Walk<'_, C> {
         let (mut removed, mut added) = (Vec::new(), Vec::new());
         if next.models.flag(self.coder, flag::CHANGED, changed) {
             removed = self.removals(&mut next.models)?;
-            added = self.additions(&mut next.models)?;
+            added = self.additions(&mut next.models, removed.len())?;
         }
         let (mut removed, mut added) = (removed.into_iter().peekable(), added.into_iter().peekable());
         let mut neighbour = 0;
@@ -105,10 +105,10 @@ impl<C: Coder> Walk<'_, C> {
     }
 
     /// Those that are new, without groups' values.
-    fn additions(&mut self, models: &mut Models) -> Result<Vec<Added>, WireError> {
+    fn additions(&mut self, models: &mut Models, removed: usize) -> Result<Vec<Added>, WireError> {
         let new: Vec<_> = self.source.map(|source| fresh(self.base, &source).collect()).unwrap_or_default();
         let count = models.number(self.coder, number::ADDED, new.len() as u32) as usize;
-        require(self.base.bodies.len() + count <= BODIES_MAX, "bodies", "at most 16384")?;
+        require(self.base.bodies.len() - removed + count <= BODIES_MAX, "bodies", "at most 16384")?;
         let mut added: Vec<Added> = Vec::new();
         let mut after = 0u32;
         for k in 0..count {
