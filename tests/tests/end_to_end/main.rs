@@ -7,6 +7,7 @@ mod bad_network;
 mod clients;
 mod daemon;
 mod driving;
+mod flooded;
 mod frozen;
 mod leaving;
 mod programs;
