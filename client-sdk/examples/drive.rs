@@ -17,12 +17,12 @@ async fn main() -> Result<(), ClientError> {
 
     let until = Instant::now() + Duration::from_secs(10);
     while Instant::now() < until {
-        let snapshot = session.next_snapshot().await?;
-        session.send(Controls { throttle: 0.2, steer: -0.8, ..Controls::default() }).await?;
-        if snapshot.tick() % 30 == 0
+        tokio::time::sleep_until(session.next_input_due().into()).await;
+        let sequence = session.send(Controls { throttle: 0.2, steer: -0.8, ..Controls::default() }).await?;
+        if sequence % 30 == 0
             && let Some([x, y, z]) = position(&session)
         {
-            println!("tick {}: {x:.1} {y:.1} {z:.1} m", snapshot.tick());
+            println!("input {sequence}: {x:.1} {y:.1} {z:.1} m");
         }
     }
 

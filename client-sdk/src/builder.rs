@@ -25,6 +25,8 @@ pub struct SessionBuilder {
     pub(crate) interpolation: Option<InterpolationSettings>,
     pub(crate) conditioner: Option<ConditionerSettings>,
     resume: Option<ResumeTicket>,
+    #[cfg(feature = "prediction")]
+    pub(crate) prediction: bool,
 }
 
 /// What lets a session go on over another connection; see [`SessionBuilder::resume`]. A secret.
@@ -64,6 +66,8 @@ impl SessionBuilder {
             interpolation: Some(InterpolationSettings::default()),
             conditioner: None,
             resume: None,
+            #[cfg(feature = "prediction")]
+            prediction: false,
         }
     }
 
@@ -103,6 +107,14 @@ impl SessionBuilder {
     pub fn resume(mut self, ticket: ResumeTicket) -> Self {
         self.arena = Some(ticket.arena.clone());
         self.resume = Some(ticket);
+        self
+    }
+
+    /// Whether to predict the own vehicle, for [`Session::own_vehicle_at`]. Each input then steps it a few ticks, which
+    /// takes some tenths of a millisecond. Off by default.
+    #[cfg(feature = "prediction")]
+    pub fn prediction(mut self, on: bool) -> Self {
+        self.prediction = on;
         self
     }
 

@@ -54,6 +54,11 @@ pub enum ClientError {
     /// The server let a player in and gave it no vehicle.
     #[error("the server let a player in without a vehicle: report it to whoever runs the server")]
     NoActor,
+    /// The server's arena cannot be stepped here.
+    #[error(
+        "the server's arena cannot be stepped here, so that nothing can be predicted ({0}): use a client of its version"
+    )]
+    Arena(String),
     /// The caller passed a value that the protocol does not allow.
     #[error("{0}")]
     BadArgument(WireError),

@@ -43,6 +43,8 @@ pub struct Inbox {
     /// For the interpolation buffer, newest last; empty where nobody interpolates.
     recent: VecDeque<Arc<ReceivedSnapshot>>,
     recent_max: usize,
+    /// For the clock of what is shown, with the snapshots: how late, and when, s.
+    lateness: VecDeque<(f64, f64)>,
     /// Sequence numbers that were sent and not acknowledged, with the time of their send.
     in_flight: VecDeque<(u32, Instant)>,
     /// Newest sequence of which the fate has been counted.
@@ -64,6 +66,7 @@ impl Inbox {
             newest: (accepted.description.tick, now),
             recent: VecDeque::new(),
             recent_max,
+            lateness: VecDeque::new(),
             in_flight: VecDeque::new(),
             counted: 0,
             statistics: Statistics::default(),
@@ -102,6 +105,7 @@ impl Inbox {
             return None;
         }
         self.acknowledged(&head.ack, now);
+        self.note_lateness(&head, arrival, now);
         self.follow_clock(&head, now);
         let snapshot = Arc::new(ReceivedSnapshot::new(head, frame, self.tick_hz, now));
         if self.recent_max > 0 {
@@ -115,6 +119,23 @@ impl Inbox {
         }
         self.newest = (snapshot.tick(), now);
         Some(snapshot)
+    }
+
+    /// Fractional tick whose input is due at `now`; `None` before the first snapshot.
+    #[cfg(feature = "prediction")]
+    pub fn input_phase(&self, now: Instant) -> Option<f64> {
+        self.inputs.phase(self.seconds(now), self.clock.period_s())
+    }
+
+    /// Takes note of how far a prediction of the own vehicle was off, m.
+    #[cfg(feature = "prediction")]
+    pub fn count_correction(&mut self, correction_m: f64) {
+        self.statistics.correction_um.saturating_record((correction_m * 1e6) as u64);
+    }
+
+    /// How late the first snapshots came after the newest before each, and when, s, since this was last asked.
+    pub fn drain_lateness(&mut self) -> Vec<(f64, f64)> {
+        self.lateness.drain(..).collect()
     }
 
     /// Takes note of an event message of so many bytes.
@@ -175,9 +196,11 @@ impl Inbox {
         now.saturating_duration_since(self.newest.1)
     }
 
-    /// Estimated tick of the server at `now`, fractional; `None` before the first snapshot.
-    pub fn tick_at(&self, now: Instant) -> Option<f64> {
-        self.clock.tick_at(self.seconds(now))
+    /// Estimated tick of the server at `now`, fractional, and `now` in the seconds of lateness; `None` before the first
+    /// snapshot.
+    pub fn tick_at(&self, now: Instant) -> Option<(f64, f64)> {
+        let seconds = self.seconds(now);
+        Some((self.clock.tick_at(seconds)?, seconds))
     }
 
     /// Snapshots that arrived since this was last asked, oldest first, as far as they are kept.
@@ -226,6 +249,20 @@ impl Inbox {
             }
         }
         self.counted = self.counted.max(ack.sequence);
+    }
+
+    /// A tick is late until something as new is there: a lost one counts until the next comes.
+    fn note_lateness(&mut self, head: &Snapshot, arrival: Arrival, now: Instant) {
+        let seconds = self.seconds(now);
+        if arrival != Arrival::Newest || self.recent_max == 0 {
+            return;
+        }
+        if let Some(expected_s) = self.clock.expected_s(head.tick.min(self.newest.0 + 1)) {
+            if self.lateness.len() == self.recent_max {
+                self.lateness.pop_front();
+            }
+            self.lateness.push_back((seconds - expected_s, seconds));
+        }
     }
 
     /// Both clocks learn from a snapshot: when the server ticks, and when inputs have to leave.

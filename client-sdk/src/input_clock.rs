@@ -97,6 +97,12 @@ impl InputClock {
         Some(self.origin_s? + (self.last_tick + 1) as f64 * period_s)
     }
 
+    /// Fractional tick whose input is due at `now_s`; `None` before the first snapshot.
+    #[cfg(feature = "prediction")]
+    pub fn phase(&self, now_s: f64, period_s: f64) -> Option<f64> {
+        Some((now_s - self.origin_s?) / period_s)
+    }
+
     /// Tick for which an input is that leaves at `now_s`: the first that it can reach, and none before that of the last
     /// input. `None` before the first snapshot.
     pub fn tick_at(&self, now_s: f64, period_s: f64) -> Option<u64> {

@@ -3,17 +3,23 @@
 //! Pure. Frames may come in any order, more than once, and with gaps. Within a tick Q is linear and Q' constant (axiom 3
 //! of the talk), so between neighbouring ticks linear positions are exact; orientations take the shortest arc.
 
+mod playback;
+
 use std::{collections::VecDeque, time::Duration};
 
 use glam::{Quat, Vec3};
 use pita_protocol::dof::{Slice, kind};
 
+pub(crate) use playback::Playback;
+
 /// How a session turns snapshots into what is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InterpolationSettings {
-    /// How far behind the newest state is shown. Less than the usual gap between snapshots makes motion guess; more
-    /// delays what the player sees.
+    /// How far behind the newest state is shown, at least. Less than the usual gap between snapshots makes motion guess;
+    /// more delays what the player sees.
     pub delay: Duration,
+    /// The same, at most. In between the delay follows how late snapshots come.
+    pub delay_max: Duration,
     /// How long states are carried on along Q' when nothing newer came; then they stand still.
     pub extrapolation_max: Duration,
     /// Most frames that are kept, 2 to 256. Older ones are dropped first.
@@ -21,9 +27,10 @@ pub struct InterpolationSettings {
 }
 
 impl Default for InterpolationSettings {
-    /// Three ticks of delay at 30 Hz (two lost snapshots in a row show nothing), a quarter of a second of guessing.
+    /// From little more than a tick of delay at 30 Hz to what a bad network asks for; a quarter of a second of guessing.
     fn default() -> Self {
-        Self { delay: Duration::from_millis(100), extrapolation_max: Duration::from_millis(250), frames_max: 16 }
+        let [delay, delay_max] = [40, 300].map(Duration::from_millis);
+        Self { delay, delay_max, extrapolation_max: Duration::from_millis(250), frames_max: 16 }
     }
 }
 

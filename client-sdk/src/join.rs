@@ -7,19 +7,21 @@ use std::{
 
 use pita_protocol::{
     Keys, keys,
-    message::{JoinAccepted, JoinReply, JoinRequest, Role, Status},
+    message::{ArenaSource, JoinAccepted, JoinReply, JoinRequest, Role, Status},
 };
 use tokio::sync::mpsc;
 use zenoh::{liveliness::LivelinessToken, pubsub::Subscriber};
 
+#[cfg(feature = "prediction")]
+use crate::prediction::Predictor;
 use crate::{
     builder::SessionBuilder,
     conditioner::{ConditionerSettings, Delivery, Link},
     error::ClientError,
-    interpolation::InterpolationBuffer,
+    interpolation::{InterpolationBuffer, Playback},
     keeper::{self, EVENTS_MAX, Incoming, Keeper},
     session::Session,
-    shared::Shared,
+    shared::{Interpolation, Shared},
     transport,
     wire::Wire,
 };
@@ -47,7 +49,13 @@ pub async fn join(
     // Before the join: no event falls between the description in its answer and the subscription.
     let (events, incoming) = subscribe_to_events(zenoh, &keys, wanted.conditioner).await?;
     let accepted = ask_to_join(wanted, zenoh, &keys, request).await?;
-    let shared = Arc::new(share(wanted, &accepted));
+    #[cfg_attr(not(feature = "prediction"), expect(unused_mut, reason = "there is nothing to add"))]
+    let mut shared = share(wanted, &accepted);
+    #[cfg(feature = "prediction")]
+    if wanted.prediction && accepted.actor.is_some() {
+        shared.prediction = Some(Mutex::new(predictor(wanted, zenoh, &keys, &accepted).await?));
+    }
+    let shared = Arc::new(shared);
     let declared = Declared {
         _events: events,
         _snapshots: subscribe_to_snapshots(zenoh, &keys, &accepted, &shared, wanted.conditioner).await?,
@@ -102,10 +110,27 @@ fn no_arena(wanted: &SessionBuilder) -> ClientError {
     ClientError::NoArena { endpoint, arena, waited: wanted.connect_timeout }
 }
 
+/// Asks for the arena's file and builds what predicts the session's own car.
+#[cfg(feature = "prediction")]
+async fn predictor(
+    wanted: &SessionBuilder,
+    zenoh: &zenoh::Session,
+    keys: &Keys,
+    accepted: &JoinAccepted,
+) -> Result<Predictor, ClientError> {
+    let asked = transport::ask(zenoh, &keys.source(), "source", Vec::new(), wanted.connect_timeout).await?;
+    let source: ArenaSource = asked.ok_or_else(|| no_arena(wanted))?;
+    let own = accepted.description.actors.iter().find(|actor| Some(actor.id) == accepted.actor);
+    let slices = own.ok_or(ClientError::NoActor)?.parts.iter().map(|part| part.slice).collect();
+    Predictor::new(&source.toml, accepted.tick_hz, slices).map_err(ClientError::Arena)
+}
+
 fn share(wanted: &SessionBuilder, accepted: &JoinAccepted) -> Shared {
     let period_s = 1.0 / f64::from(accepted.tick_hz);
-    let interpolation =
-        wanted.interpolation.map(|settings| (settings.delay, Mutex::new(InterpolationBuffer::new(settings, period_s))));
+    let interpolation = wanted.interpolation.map(|settings| Interpolation {
+        buffer: InterpolationBuffer::new(settings, period_s),
+        playback: Playback::new(period_s, settings.delay.as_secs_f64(), settings.delay_max.as_secs_f64()),
+    });
     let recent_max = wanted.interpolation.map_or(0, |settings| settings.frames_max());
     Shared::new(accepted, recent_max, interpolation)
 }

@@ -4,7 +4,8 @@
 //! [snapshot](ReceivedSnapshot), the [roster](Roster) of actors and [counts](Statistics) up to date in the background,
 //! and interpolates between snapshots on request. [`bots`] are sessions that drive themselves.
 //!
-//! Owns everything between the wire and a game's own code. It knows the protocol crate and no engine. What arrives is
+//! Owns everything between the wire and a game's own code. It knows the protocol crate, and with the
+//! feature `prediction`, which is on by default, the game, to step one's own vehicle. What arrives is
 //! untrusted: it is checked, counted where it is of no use, and never takes more than bounded memory.
 //!
 //! ```no_run
@@ -23,6 +24,8 @@ mod join;
 mod keeper;
 mod lock;
 mod outbox;
+#[cfg(feature = "prediction")]
+mod prediction;
 mod roster;
 mod session;
 mod shared;

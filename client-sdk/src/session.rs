@@ -19,7 +19,7 @@ use crate::{
     join::Declared,
     lock::lock,
     roster::Roster,
-    shared::{NewestReceiver, Shared, StatisticsReader},
+    shared::{Interpolation, NewestReceiver, Shared, StatisticsReader},
     snapshot::ReceivedSnapshot,
     statistics::Statistics,
     transport,
@@ -155,22 +155,41 @@ impl Session {
         }
     }
 
-    /// The world as it is to be shown at `now`: some [delay](crate::InterpolationSettings::delay) behind the server,
-    /// interpolated between snapshots. `None` before the first snapshot, and for a session built without
+    /// The world as it is to be shown at `now`: as far behind the server as [settings](crate::InterpolationSettings) and
+    /// network ask for, and interpolated between snapshots. `None` before the first snapshot, and for a session built without
     /// interpolation.
     pub fn world_at(&self, now: Instant) -> Option<WorldState> {
-        let (delay, buffer) = self.shared.interpolation.as_ref()?;
-        let (recent, tick) = {
+        let interpolation = self.shared.interpolation.as_ref()?;
+        let (recent, lateness, tick) = {
             let mut inbox = lock(&self.shared.inbox);
-            (inbox.drain_recent(), inbox.tick_at(now))
+            (inbox.drain_recent(), inbox.drain_lateness(), inbox.tick_at(now))
         };
-        let mut buffer = lock(buffer);
+        let mut interpolation = lock(interpolation);
+        let Interpolation { buffer, playback } = &mut *interpolation;
         for snapshot in recent {
             // One that cannot be read has been counted, and is a gap like a lost one.
             buffer.insert(Frame { tick: snapshot.tick(), slices: snapshot.slices() });
         }
-        let tick = (tick? - delay.as_secs_f64() * f64::from(self.tick_hz())).max(0.0);
+        lateness.into_iter().for_each(|(late_s, at_s)| playback.observe(late_s, at_s));
+        let (newest, now_s) = tick?;
+        let tick = playback.tick(newest, now_s);
         Some(WorldState { tick, slices: buffer.sample(tick)? })
+    }
+
+    /// The own vehicle's bodies as they are to be shown at `now`: predicted from the inputs so far, ahead of everything
+    /// else that is shown. In order of slice. `None` before the first input that follows a snapshot, and for a session
+    /// built without [prediction](SessionBuilder::prediction).
+    #[cfg(feature = "prediction")]
+    pub fn own_vehicle_at(&self, now: Instant) -> Option<Vec<Slice>> {
+        let phase = lock(&self.shared.inbox).input_phase(now)?;
+        // The input of a tick leaves as its phase begins, and takes the car to the tick's end.
+        lock(self.shared.prediction.as_ref()?).at(phase - 1.0)
+    }
+
+    /// How far behind the newest state [`Session::world_at`] shows the world, as the network asks for it now.
+    pub fn interpolation_delay(&self) -> Option<Duration> {
+        let interpolation = self.shared.interpolation.as_ref()?;
+        Some(Duration::from_secs_f64(lock(interpolation).playback.delay_s()))
     }
 
     /// Waits for the next event. `None` once the session has ended and all events have been read.

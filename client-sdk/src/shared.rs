@@ -2,19 +2,33 @@
 
 use std::{
     sync::{Arc, Mutex},
-    time::{Duration, Instant},
+    time::Instant,
 };
 
+#[cfg(feature = "prediction")]
+use pita_protocol::message::Controls;
 use pita_protocol::message::JoinAccepted;
 use tokio::sync::watch;
 
+#[cfg(feature = "prediction")]
+use crate::prediction::{Predictor, body_state};
 use crate::{
-    error::SessionEnd, events::EventQueue, inbox::Inbox, interpolation::InterpolationBuffer, lock::lock,
-    roster::Roster, snapshot::ReceivedSnapshot, statistics::Statistics,
+    error::SessionEnd,
+    events::EventQueue,
+    inbox::Inbox,
+    interpolation::{InterpolationBuffer, Playback},
+    lock::lock,
+    roster::Roster,
+    snapshot::ReceivedSnapshot,
+    statistics::Statistics,
 };
 
-/// A delay and the buffer that is read so far behind the newest state.
-type Interpolation = (Duration, Mutex<InterpolationBuffer>);
+/// States to interpolate between, and the clock of what is shown.
+#[derive(Debug)]
+pub struct Interpolation {
+    pub buffer: InterpolationBuffer,
+    pub playback: Playback,
+}
 
 /// Sees the newest snapshot change.
 pub type NewestReceiver = watch::Receiver<Option<Arc<ReceivedSnapshot>>>;
@@ -28,7 +42,9 @@ pub struct Shared {
     roster: Mutex<Arc<Roster>>,
     newest: watch::Sender<Option<Arc<ReceivedSnapshot>>>,
     end: watch::Sender<Option<SessionEnd>>,
-    pub interpolation: Option<Interpolation>,
+    pub interpolation: Option<Mutex<Interpolation>>,
+    #[cfg(feature = "prediction")]
+    pub prediction: Option<Mutex<Predictor>>,
 }
 
 impl Shared {
@@ -39,7 +55,9 @@ impl Shared {
             roster: Mutex::new(Arc::new(Roster::new(&accepted.description))),
             newest: watch::Sender::new(None),
             end: watch::Sender::new(None),
-            interpolation,
+            interpolation: interpolation.map(Mutex::new),
+            #[cfg(feature = "prediction")]
+            prediction: None,
         }
     }
 
@@ -57,6 +75,21 @@ impl Shared {
 
     pub fn newest(&self) -> Option<Arc<ReceivedSnapshot>> {
         self.newest.borrow().clone()
+    }
+
+    /// Predicts the own vehicle up to `tick`, for which `controls` are: from where the newest snapshot says that it was.
+    #[cfg(feature = "prediction")]
+    pub fn predict(&self, tick: u64, controls: &Controls) {
+        let Some(predictor) = &self.prediction else { return };
+        let mut predictor = lock(predictor);
+        let seen =
+            self.newest().and_then(|snapshot| Some((snapshot.tick(), own_bodies(&snapshot, predictor.slices())?)));
+        if let Some((seen, bodies)) = seen
+            && let Some(correction_m) = predictor.reconcile(seen, bodies)
+        {
+            lock(&self.inbox).count_correction(correction_m);
+        }
+        predictor.drive(tick, controls);
     }
 
     /// Waits, on the receiver's behalf, for a snapshot that it has not seen.
@@ -106,6 +139,13 @@ impl Shared {
         });
         self.events.close();
     }
+}
+
+/// The bodies of `slices`, in that order; `None` where the snapshot lacks one.
+#[cfg(feature = "prediction")]
+fn own_bodies(snapshot: &ReceivedSnapshot, slices: &[u32]) -> Option<Vec<pita_game::BodyState>> {
+    let bodies: Vec<_> = snapshot.select(slices).iter().filter_map(body_state).collect();
+    (bodies.len() == slices.len()).then_some(bodies)
 }
 
 /// The counts of a session that somebody else owns.

@@ -53,6 +53,8 @@ pub struct Statistics {
     pub latency_us: Durations,
     /// How far snapshots arrived from when they were expected, µs.
     pub jitter_us: Durations,
+    /// By how much the newest prediction of the own vehicle moved for each snapshot, µm.
+    pub correction_um: Durations,
     /// From the newest state seen to the tick that an input is meant for, when it is sent, µs.
     pub lead_us: Durations,
 }
@@ -78,6 +80,7 @@ impl Default for Statistics {
             latency_us: durations(),
             jitter_us: durations(),
             lead_us: durations(),
+            correction_um: durations(),
         }
     }
 }
@@ -107,8 +110,8 @@ impl Statistics {
         }
     }
 
-    fn durations(&mut self) -> [&mut Durations; 3] {
-        [&mut self.latency_us, &mut self.jitter_us, &mut self.lead_us]
+    fn durations(&mut self) -> [&mut Durations; 4] {
+        [&mut self.latency_us, &mut self.jitter_us, &mut self.lead_us, &mut self.correction_um]
     }
 
     fn counts(&mut self) -> [&mut u64; 15] {

@@ -71,6 +71,8 @@ impl Wire {
             let inbox = lock(&self.shared.inbox);
             (inbox.acknowledgement(), inbox.input_tick(now))
         };
+        #[cfg(feature = "prediction")]
+        self.shared.predict(tick, &controls);
         let (sequence, packet) = lock(&self.outbox).packet(controls, tick, acknowledged, leave);
         let sealed = seal(&packet, &self.session_key, &self.key_expr);
         lock(&self.shared.inbox).note_sent(sequence, tick, sealed.len(), now);

@@ -3,6 +3,7 @@
 //! ```text
 //! pita/<arena>/join               query: JoinRequest -> JoinReply
 //! pita/<arena>/describe           query: - -> Description
+//! pita/<arena>/source             query: - -> ArenaSource
 //! pita/<arena>/status             query: - -> Status
 //! pita/<arena>/ticks              query: TicksRequest -> TickRecords
 //! pita/<arena>/input/<slot>       put by the client: sealed InputPacket
@@ -48,6 +49,11 @@ impl Keys {
     /// Query: answered by the present [`Description`](crate::message::Description).
     pub fn describe(&self) -> String {
         self.of("describe")
+    }
+
+    /// Query: answered by [`ArenaSource`](crate::message::ArenaSource).
+    pub fn source(&self) -> String {
+        self.of("source")
     }
 
     /// Query: answered by [`Status`](crate::message::Status).

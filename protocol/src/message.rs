@@ -367,6 +367,21 @@ impl Message for EventMessage {
     }
 }
 
+/// Answer on [`source`](crate::Keys::source): the arena's file, for those who predict their own vehicle.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ArenaSource {
+    /// TOML, as the server read it.
+    pub toml: String,
+}
+
+impl Message for ArenaSource {
+    const KIND: u8 = 10;
+    const MAX_BYTES: usize = 1 << 20;
+    fn validate(&self) -> Result<(), WireError> {
+        Ok(())
+    }
+}
+
 // --- how the server does -------------------------------------------------------------------------------------------
 
 /// Answer on [`status`](crate::Keys::status).

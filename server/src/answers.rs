@@ -29,6 +29,8 @@ pub enum Question {
     Join,
     /// The world.
     Describe,
+    /// The arena's file.
+    Source,
     /// How the daemon does.
     Status,
     /// What ticks cost.
@@ -122,6 +124,7 @@ impl Answering {
         match question {
             Question::Join => self.join(query),
             Question::Describe => reply(shared, &query, shared.keys.describe(), &*shared.description()),
+            Question::Source => reply(shared, &query, shared.keys.source(), &shared.source),
             Question::Status => reply(shared, &query, shared.keys.status(), &metrics::status(shared)),
             Question::Ticks => match payload::<TicksRequest>(&query) {
                 Ok(request) => {

@@ -28,16 +28,17 @@ pub enum SourceError {
     },
 }
 
-/// Builds the arena called `source`: a built-in name, else a path.
+/// Builds the arena called `source`: a built-in name, else a path. Answers its text too.
 ///
 /// # Errors
 /// [`SourceError`].
-pub fn load(source: &str, settings: &ArenaSettings) -> Result<Arena, SourceError> {
+pub fn load(source: &str, settings: &ArenaSettings) -> Result<(Arena, String), SourceError> {
     match BUILT_IN.iter().find(|(name, _)| *name == source) {
-        Some((name, text)) => parse(text, &format!("built-in arena {name}"), settings),
+        Some((name, text)) => Ok((parse(text, &format!("built-in arena {name}"), settings)?, (*text).to_owned())),
         None => {
             let unreadable = |reason| SourceError::Unreadable { source_name: source.to_owned(), reason };
-            parse(&std::fs::read_to_string(Path::new(source)).map_err(unreadable)?, source, settings)
+            let text = std::fs::read_to_string(Path::new(source)).map_err(unreadable)?;
+            Ok((parse(&text, source, settings)?, text))
         }
     }
 }

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use pita_game::{Arena, ArenaSettings};
 use pita_protocol::Keys;
+use pita_protocol::message::ArenaSource;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::oneshot;
 
@@ -82,14 +83,14 @@ pub fn run(args: &RunArgs) -> ExitCode {
 fn start(args: &RunArgs, clock: Clock) -> Result<(), DaemonError> {
     let (out, log) = (Output::to(std::io::stdout())?, Output::to(std::io::stderr())?);
     init_logging(log.clone());
-    let ended = configure(args).and_then(|(config, arena)| run_arena(&config, arena, clock, &out));
+    let ended = configure(args).and_then(|configured| run_arena(configured, clock, &out));
     out.flush();
     log.flush();
     ended
 }
 
 /// Reads configuration and arena; arguments come before the file.
-fn configure(args: &RunArgs) -> Result<(ServerConfig, Arena), DaemonError> {
+fn configure(args: &RunArgs) -> Result<Configured, DaemonError> {
     let mut config = match &args.config {
         Some(file) => ServerConfig::from_file(file)?,
         None => ServerConfig::built_in(),
@@ -104,16 +105,25 @@ fn configure(args: &RunArgs) -> Result<(ServerConfig, Arena), DaemonError> {
         config.tick.tick_hz = rate;
     }
     let settings = ArenaSettings { tick_hz: config.tick.tick_hz.hz(), threads: config.arena.threads.get() as usize };
-    let arena = arena_source::load(&config.arena.source, &settings)?;
-    Ok((config, arena))
+    let (arena, source) = arena_source::load(&config.arena.source, &settings)?;
+    Ok(Configured { config, arena, source })
 }
 
-fn run_arena(config: &ServerConfig, arena: Arena, clock: Clock, out: &Output) -> Result<(), DaemonError> {
+/// What is to run.
+struct Configured {
+    config: ServerConfig,
+    arena: Arena,
+    /// Text of the arena.
+    source: String,
+}
+
+fn run_arena(Configured { config, arena, source }: Configured, clock: Clock, out: &Output) -> Result<(), DaemonError> {
+    let config = &config;
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(RUNTIME_THREADS).enable_all().build()?;
     runtime.block_on(async {
         // Before anything that has to be ended in order.
         let ending = watch_signals(Signals::new()?);
-        let shared = Arc::new(share(config, &arena, clock)?);
+        let shared = Arc::new(share(config, &arena, source, clock)?);
         let (session, endpoint) = network::open(&config.network, &shared.keys).await?;
         let mut serving = Serving::start(config, arena, &shared, session)?;
         out.print(&report::welcome(&endpoint, &metrics::status(&shared)));
@@ -124,7 +134,7 @@ fn run_arena(config: &ServerConfig, arena: Arena, clock: Clock, out: &Output) ->
     })
 }
 
-fn share(config: &ServerConfig, arena: &Arena, clock: Clock) -> Result<Shared, DaemonError> {
+fn share(config: &ServerConfig, arena: &Arena, source: String, clock: Clock) -> Result<Shared, DaemonError> {
     let name_error = |reason| DaemonError::ArenaName { name: arena.name().to_owned(), reason };
     let limits = config.sessions;
     // Ranges of the configuration are within u16.
@@ -147,6 +157,7 @@ fn share(config: &ServerConfig, arena: &Arena, clock: Clock) -> Result<Shared, D
             &config.bans.names,
         ),
         description: description::describe(arena),
+        source: ArenaSource { toml: source },
     }))
 }
 

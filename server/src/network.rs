@@ -148,8 +148,15 @@ fn configuration(config: &Network, keys: &Keys, endpoint: &str) -> zenoh::Config
 
 /// What clients may do: put inputs, ask, listen, show their tokens. Everything else is denied.
 fn access_rules(keys: &Keys) -> serde_json::Value {
-    let questions =
-        [keys.join(), keys.describe(), keys.status(), keys.ticks(), ANY_JOIN.to_owned(), ANY_STATUS.to_owned()];
+    let questions = [
+        keys.join(),
+        keys.describe(),
+        keys.source(),
+        keys.status(),
+        keys.ticks(),
+        ANY_JOIN.to_owned(),
+        ANY_STATUS.to_owned(),
+    ];
     let allow = |id: &str, flow: &str, messages: &[&str], key_exprs: &[String]| {
         json!({
             "id": id, "flows": [flow], "permission": "allow", "messages": messages, "key_exprs": key_exprs

@@ -10,7 +10,7 @@ use std::thread::Thread;
 
 use crossbeam_queue::ArrayQueue;
 use pita_protocol::Keys;
-use pita_protocol::message::Description;
+use pita_protocol::message::{ArenaSource, Description};
 
 use crate::boarding::Boarding;
 use crate::counters::Counters;
@@ -32,6 +32,8 @@ pub struct Shared {
     pub input_timeout_ms: u32,
     /// What was sent, received and refused.
     pub counters: Counters,
+    /// The arena's file.
+    pub source: ArenaSource,
     /// Network to tick thread.
     pub inputs: InputQueue,
     /// Publishing thread to tick thread, in order.
@@ -72,6 +74,8 @@ pub struct Start {
     pub sessions: Sessions,
     /// The world before the first tick.
     pub description: Description,
+    /// The arena's file.
+    pub source: ArenaSource,
 }
 
 impl Shared {
@@ -85,6 +89,7 @@ impl Shared {
             tick_hz: start.tick_hz,
             input_timeout_ms: start.input_timeout_ms,
             counters: Counters::default(),
+            source: start.source,
             inputs: InputQueue::new(start.inputs_max),
             boarding,
             frames: FramePool::new(),

@@ -63,7 +63,7 @@ impl Subject {
         let tick_hz = args.tick_hz.hz();
         if args.scene.extension().is_none_or(|extension| extension != "scene") {
             let settings = ArenaSettings { tick_hz, threads: usize::from(args.threads) };
-            return Ok(Self::Arena(Box::new(arena_source::load(&args.scene.to_string_lossy(), &settings)?)));
+            return Ok(Self::Arena(Box::new(arena_source::load(&args.scene.to_string_lossy(), &settings)?.0)));
         }
         let file = args.scene.display().to_string();
         let text = std::fs::read_to_string(&args.scene)

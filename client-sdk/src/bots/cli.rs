@@ -53,6 +53,9 @@ pub struct Args {
     /// s), seed; before one of them `up.` or `down.` for one direction.
     #[arg(long, value_name = "KEY=VALUE,..")]
     conditioner: Option<ConditionerSettings>,
+    /// Look at the world as a player's screen would show it, and count how smoothly cars move.
+    #[arg(long)]
+    watch: bool,
     /// How long to wait for a server to answer, s.
     #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u32).range(0..=86_400))]
     wait: u32,
@@ -95,6 +98,7 @@ async fn run(args: &Args) -> Result<Report, ClientError> {
         scripts: args.script.clone(),
         seed: args.seed,
         conditioner: args.conditioner,
+        watch: args.watch,
         ..FleetSettings::new(&args.connect)
     });
     let mut interrupted = watch_signals();

@@ -12,7 +12,7 @@ use tokio::{
     time::{Instant, sleep_until},
 };
 
-use super::{Script, View, recovery::Recovery};
+use super::{Script, View, recovery::Recovery, watcher::Watcher};
 use crate::{
     ClientError, Session, SessionEnd,
     lock::lock,
@@ -31,6 +31,8 @@ pub struct Meter {
     pub lateness_us: Durations,
     /// Inputs that were left out because they were late by a whole tick or more.
     pub inputs_skipped: u64,
+    /// As [`BotTally::jumps_um`](super::BotTally::jumps_um).
+    pub jumps_um: Durations,
     /// Why the bot's session ended before it was stopped.
     pub lost: Option<SessionEnd>,
 }
@@ -38,7 +40,7 @@ pub struct Meter {
 impl Meter {
     /// Of a bot that has not driven yet.
     pub fn new() -> Self {
-        Self { distance_m: 0.0, lateness_us: durations(), inputs_skipped: 0, lost: None }
+        Self { distance_m: 0.0, lateness_us: durations(), inputs_skipped: 0, jumps_um: durations(), lost: None }
     }
 }
 
@@ -50,12 +52,13 @@ pub struct Driver {
     recovery: Recovery,
     meter: Arc<Mutex<Meter>>,
     last: Option<Vec3>,
+    watcher: Watcher,
 }
 
 impl Driver {
     /// Drives `session`, whose own car is `actor`.
     pub fn new(session: Session, actor: u32, script: Box<dyn Script>, meter: Arc<Mutex<Meter>>) -> Self {
-        Self { session, actor, script, recovery: Recovery::default(), meter, last: None }
+        Self { session, actor, script, recovery: Recovery::default(), meter, last: None, watcher: Watcher::default() }
     }
 
     /// Drives until `stop` turns true or the session ends; leaves in either case.
@@ -71,6 +74,7 @@ impl Driver {
             }
             self.note_lateness(due, period);
             let controls = self.controls();
+            self.watch();
             match self.session.send(controls).await {
                 Ok(_) => {}
                 Err(ClientError::Ended(end)) => {
@@ -100,6 +104,15 @@ impl Driver {
         self.measure(view.own.position);
         let wanted = self.script.drive(&view, snapshot.tick());
         self.recovery.drive(&view.own, wanted)
+    }
+
+    /// Looks at the other cars, where the session shows them.
+    fn watch(&mut self) {
+        let now = std::time::Instant::now();
+        let Some(world) = self.session.world_at(now) else { return };
+        let jumps = self.watcher.look(&world, &self.session.roster(), self.actor, now);
+        let mut meter = lock(&self.meter);
+        jumps.into_iter().for_each(|jump_m| meter.jumps_um.saturating_record((f64::from(jump_m) * 1e6) as u64));
     }
 
     fn measure(&mut self, position: Vec3) {

@@ -14,7 +14,7 @@ use super::{
     BotTally, FleetTally, ScriptKind,
     driver::{Driver, Meter},
 };
-use crate::{ClientError, ConditionerSettings, Session, lock::lock, shared::StatisticsReader};
+use crate::{ClientError, ConditionerSettings, InterpolationSettings, Session, lock::lock, shared::StatisticsReader};
 
 /// Connections that are opened at the same time. More would not be faster: opening is work for both sides.
 const OPENING_MAX: usize = 8;
@@ -38,6 +38,9 @@ pub struct FleetSettings {
     pub loss_timeout: Duration,
     /// As [`SessionBuilder::conditioner`](crate::SessionBuilder::conditioner), each bot with a seed of its own.
     pub conditioner: Option<ConditionerSettings>,
+    /// Whether bots look at the world as a player's screen would show it, which costs time: others interpolated, the own
+    /// car predicted. It is counted how smoothly both move.
+    pub watch: bool,
 }
 
 impl FleetSettings {
@@ -52,6 +55,7 @@ impl FleetSettings {
             connect_timeout: Duration::from_secs(5),
             loss_timeout: Duration::from_secs(3),
             conditioner: None,
+            watch: false,
         }
     }
 
@@ -151,6 +155,7 @@ impl BotFleet {
                 distances_m: vec![meter.distance_m],
                 lateness_us: meter.lateness_us.clone(),
                 inputs_skipped: meter.inputs_skipped,
+                jumps_um: meter.jumps_um.clone(),
                 session: bot.statistics.read(),
             };
             tally.add(bot.script, &counted);
@@ -184,6 +189,9 @@ async fn connect(settings: FleetSettings, number: usize) -> Result<(usize, Sessi
     let builder = builder
         .connect_timeout(settings.connect_timeout)
         .loss_timeout(settings.loss_timeout)
-        .conditioner(settings.conditioner.map(seeded));
-    Ok((number, builder.interpolation(None).connect().await?))
+        .conditioner(settings.conditioner.map(seeded))
+        .interpolation(settings.watch.then(InterpolationSettings::default));
+    #[cfg(feature = "prediction")]
+    let builder = builder.prediction(settings.watch);
+    Ok((number, builder.connect().await?))
 }

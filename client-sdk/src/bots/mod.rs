@@ -13,6 +13,7 @@ mod report;
 pub mod scripts;
 mod tally;
 mod view;
+mod watcher;
 
 pub use fleet::{BotFleet, FleetSettings};
 pub use report::Report;

@@ -140,6 +140,9 @@ fn figures(tally: &BotTally, elapsed: Duration) -> Value {
         "inputs_superseded": session.inputs_superseded,
         "inputs_early": session.inputs_early,
         "inputs_missing": session.inputs_missing,
+        "remote_jump_p99_m": quantile_m(&tally.jumps_um, 0.99),
+        "remote_jump_max_m": quantile_m(&tally.jumps_um, 1.0),
+        "own_correction_p99_m": quantile_m(&session.correction_um, 0.99),
         "jitter_p99_ms": quantile_ms(&session.jitter_us, 0.99),
         "lead_p50_ms": quantile_ms(&session.lead_us, 0.5),
         "distance_min_m": tally.distance_min_m(),
@@ -160,6 +163,11 @@ fn per_second(count: u64, elapsed: Duration) -> f64 {
 /// `None` where nothing was measured.
 fn quantile_ms(durations: &Durations, quantile: f64) -> Option<f64> {
     (!durations.is_empty()).then(|| durations.value_at_quantile(quantile) as f64 / 1e3)
+}
+
+/// Of distances in µm; `None` where nothing was measured.
+fn quantile_m(distances_um: &Durations, quantile: f64) -> Option<f64> {
+    (!distances_um.is_empty()).then(|| distances_um.value_at_quantile(quantile) as f64 / 1e6)
 }
 
 fn milliseconds(durations: &Durations, quantile: f64) -> String {

@@ -24,6 +24,8 @@ pub struct BotTally {
     pub lateness_us: Durations,
     /// Inputs that were left out because they were late by a whole tick or more.
     pub inputs_skipped: u64,
+    /// How far other cars were shown from where their own speed would have taken them since they were shown last, µm.
+    pub jumps_um: Durations,
     /// What the sessions counted.
     pub session: Statistics,
 }
@@ -36,6 +38,7 @@ impl Default for BotTally {
             distances_m: Vec::new(),
             lateness_us: durations(),
             inputs_skipped: 0,
+            jumps_um: durations(),
             session: Statistics::default(),
         }
     }
@@ -58,6 +61,7 @@ impl BotTally {
         self.distances_m.extend_from_slice(&other.distances_m);
         // All histograms here have the same bounds.
         let _ = self.lateness_us.add(&other.lateness_us);
+        let _ = self.jumps_um.add(&other.jumps_um);
         self.inputs_skipped += other.inputs_skipped;
         self.session.add(&other.session);
     }
@@ -67,6 +71,7 @@ impl BotTally {
         interval.distances_m.iter_mut().zip(&earlier.distances_m).for_each(|(now, before)| *now -= before);
         // Fails only where `earlier` holds more than `self`, which it does not by its meaning.
         let _ = interval.lateness_us.subtract(&earlier.lateness_us);
+        let _ = interval.jumps_um.subtract(&earlier.jumps_um);
         interval.inputs_skipped = self.inputs_skipped.saturating_sub(earlier.inputs_skipped);
         interval.session = self.session.since(&earlier.session);
         interval

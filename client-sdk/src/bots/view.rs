@@ -6,7 +6,7 @@ use pita_protocol::dof::{Slice, kind};
 use crate::{ReceivedSnapshot, Roster};
 
 /// Kind of the actors that scripts take for cars.
-const VEHICLE: &str = "vehicle";
+pub(super) const VEHICLE: &str = "vehicle";
 
 /// Root body of a car: x points forwards, y up.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -76,6 +76,7 @@ fn declare(shared: &Arc<Shared>, session: &zenoh::Session, asker: &Asker) -> zen
     let keys = &shared.keys;
     for (key, question) in [
         (keys.describe(), Question::Describe),
+        (keys.source(), Question::Source),
         (keys.status(), Question::Status),
         (keys.ticks(), Question::Ticks),
         (keys.join(), Question::Join),

@@ -5,15 +5,26 @@ use std::time::Duration;
 use pita_client::bots::{BotFleet, FleetSettings, FleetTally, ScriptKind};
 use pita_client::{ConditionerSettings, Durations};
 
-use crate::{stalls_while, start_server};
+use crate::{observed, pita_server, stalls_while};
 
 /// There and back on average, and the most that jitter adds both ways, ms.
 const ROUND_TRIP_MS: f64 = 100.0;
+/// Room for everybody to drive without meeting anybody.
+const ARENA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/arenas/flat.toml");
 const CONDITIONS: &str = "latency=50,jitter=20,loss=5,seed=2002";
 /// Drivers, and how long they are given to learn the network and then watched.
 const BOTS: usize = 4;
 const LEARNING: Duration = Duration::from_secs(6);
 const WATCHED: Duration = Duration::from_secs(12);
+
+/// Most that the prediction of one's own car may be off, p99, and that another car may be shown from where its motion
+/// would have it.
+const OWN_CORRECTION_P99_M: f64 = 0.15;
+const JUMP_MAX_M: f64 = 0.2;
+
+fn metres(distances_um: &Durations, quantile: f64) -> f64 {
+    distances_um.value_at_quantile(quantile) as f64 / 1e6
+}
 
 fn ms(durations: &Durations, quantile: f64) -> f64 {
     durations.value_at_quantile(quantile) as f64 / 1e3
@@ -21,11 +32,12 @@ fn ms(durations: &Durations, quantile: f64) -> f64 {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn over_a_bad_network_inputs_take_effect_in_time() {
-    let (server, observer) = start_server().await;
+    let (server, observer) = observed(pita_server().args(["run", "--arena", ARENA])).await;
     let conditions: ConditionerSettings = CONDITIONS.parse().unwrap();
     let settings = FleetSettings {
         scripts: vec![ScriptKind::Circle],
         conditioner: Some(conditions),
+        watch: true,
         ..FleetSettings::new(&server.endpoint)
     };
     let mut fleet = BotFleet::new(settings);
@@ -46,7 +58,7 @@ async fn over_a_bad_network_inputs_take_effect_in_time() {
     let allowed = ROUND_TRIP_MS + 3.0 * tick_ms + 2.0 * own_stall.as_secs_f64() * 1e3 + 2.0 * server_stall;
     let found = format!(
         "effect p50 {:.1} ms, p99 {:.1} ms of {allowed:.1} allowed; jitter p99 {:.1} ms, lead p50 {:.1} ms; inputs: {} in \
-         time, {} late, {} superseded, {} early, {} missing; snapshots: {} received, {} missed; stalls: {own_stall:?} \
+         time, {} late, {} superseded, {} early, {} missing; snapshots: {} received, {} missed; own car corrected p99 {:.3} m; others off p99 {:.3} m, worst {:.3} m; stalls: {own_stall:?} \
          here, {server_stall:.1} ms there",
         ms(&session.latency_us, 0.5),
         ms(&session.latency_us, 0.99),
@@ -59,11 +71,16 @@ async fn over_a_bad_network_inputs_take_effect_in_time() {
         session.inputs_missing,
         session.snapshots_received,
         session.snapshots_missed,
+        metres(&session.correction_um, 0.99),
+        metres(&total.jumps_um, 0.99),
+        metres(&total.jumps_um, 1.0),
     );
     eprintln!("{found}");
     assert_eq!((total.connected, total.lost.len()), (BOTS, 0), "{:?}", total.lost);
     assert!(session.snapshots_missed > 0, "the conditioner loses nothing: {found}");
     assert!(ms(&session.latency_us, 0.99) <= allowed, "{found}");
+    assert!(metres(&session.correction_um, 0.99) < OWN_CORRECTION_P99_M, "{found}");
+    assert!(metres(&total.jumps_um, 1.0) < JUMP_MAX_M, "{found}");
     assert!(session.inputs_early == 0, "{found}");
     server.stop().unwrap_or_else(|error| panic!("{error}"));
 }
