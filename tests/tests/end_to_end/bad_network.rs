@@ -35,7 +35,7 @@ async fn over_a_bad_network_inputs_take_effect_in_time() {
     let (server, observer) = observed(pita_server().args(["run", "--arena", ARENA])).await;
     let conditions: ConditionerSettings = CONDITIONS.parse().unwrap();
     let settings = FleetSettings {
-        scripts: vec![ScriptKind::Circle],
+        scripts: vec![ScriptKind::Circle, ScriptKind::Wander],
         conditioner: Some(conditions),
         watch: true,
         ..FleetSettings::new(&server.endpoint)
@@ -58,7 +58,7 @@ async fn over_a_bad_network_inputs_take_effect_in_time() {
     let allowed = ROUND_TRIP_MS + 3.0 * tick_ms + 2.0 * own_stall.as_secs_f64() * 1e3 + 2.0 * server_stall;
     let found = format!(
         "effect p50 {:.1} ms, p99 {:.1} ms of {allowed:.1} allowed; jitter p99 {:.1} ms, lead p50 {:.1} ms; inputs: {} in \
-         time, {} late, {} superseded, {} early, {} missing; snapshots: {} received, {} missed; own car corrected p99 {:.3} m; others off p99 {:.3} m, worst {:.3} m; stalls: {own_stall:?} \
+         time, {} late, {} superseded, {} early, {} missing; snapshots: {} received, {} missed; own car corrected p99 {:.3} m, worst {:.3} m of {} times; others off p99 {:.3} m, worst {:.3} m; stalls: {own_stall:?} \
          here, {server_stall:.1} ms there",
         ms(&session.latency_us, 0.5),
         ms(&session.latency_us, 0.99),
@@ -72,6 +72,8 @@ async fn over_a_bad_network_inputs_take_effect_in_time() {
         session.snapshots_received,
         session.snapshots_missed,
         metres(&session.correction_um, 0.99),
+        metres(&session.correction_um, 1.0),
+        session.correction_um.len(),
         metres(&total.jumps_um, 0.99),
         metres(&total.jumps_um, 1.0),
     );
@@ -79,6 +81,11 @@ async fn over_a_bad_network_inputs_take_effect_in_time() {
     assert_eq!((total.connected, total.lost.len()), (BOTS, 0), "{:?}", total.lost);
     assert!(session.snapshots_missed > 0, "the conditioner loses nothing: {found}");
     assert!(ms(&session.latency_us, 0.99) <= allowed, "{found}");
+    let looks = 15 * BOTS as u64 * WATCHED.as_secs();
+    assert!(
+        session.correction_um.len() > looks && total.jumps_um.len() > looks,
+        "hardly anything was looked at: {found}"
+    );
     assert!(metres(&session.correction_um, 0.99) < OWN_CORRECTION_P99_M, "{found}");
     assert!(metres(&total.jumps_um, 1.0) < JUMP_MAX_M, "{found}");
     assert!(session.inputs_early == 0, "{found}");
