@@ -20,6 +20,9 @@ const PAST_MAX: usize = 64;
 const RIGHT_M: f64 = 0.02;
 const RIGHT_M_PER_S: f64 = 0.3;
 const RIGHT_RAD: f64 = 0.015;
+/// Within these the car is still the one that was predicted, but for a push, m, m/s.
+const NEAR_M: f64 = 0.5;
+const NEAR_M_PER_S: f64 = 2.0;
 /// What is shown goes over to a new prediction with this time constant.
 const SMOOTHING: Duration = Duration::from_millis(100);
 /// Further off than this it jumps, m: it was put somewhere else.
@@ -95,7 +98,7 @@ impl Predictor {
         if is_right(&confirmed.state.bodies, &bodies) {
             return Some(0.0);
         }
-        confirmed.state.bodies = bodies;
+        confirmed.state.bodies = moved(&confirmed.state.bodies, bodies);
         let before = chassis(self.past.back()?)?;
         self.replay();
         let after = chassis(self.past.back()?)?;
@@ -185,6 +188,25 @@ fn is_right(predicted: &[BodyState], real: &[BodyState]) -> bool {
     a.position.distance(b.position) < RIGHT_M
         && a.velocity.distance(b.velocity) < RIGHT_M_PER_S
         && a.rotation.angle_between(b.rotation) < RIGHT_RAD
+}
+
+/// The car as it was predicted, moved to where its chassis is: speeds of single bodies come over the wire as differences
+/// of rounded positions, and wheels whose spin does not fit their car brake it. `real` itself where they are far apart.
+fn moved(predicted: &[BodyState], real: Vec<BodyState>) -> Vec<BodyState> {
+    let (Some(&from), Some(&to)) = (predicted.first(), real.first()) else { return real };
+    let is_near = from.position.distance(to.position) < NEAR_M && from.velocity.distance(to.velocity) < NEAR_M_PER_S;
+    if !is_near || predicted.len() != real.len() {
+        return real;
+    }
+    let turn = to.rotation * from.rotation.inverse();
+    let faster = to.velocity - turn * from.velocity;
+    let moved = |body: &BodyState| BodyState {
+        position: to.position + turn * (body.position - from.position),
+        rotation: (turn * body.rotation).normalize(),
+        velocity: turn * body.velocity + faster,
+        angular_velocity: turn * body.angular_velocity,
+    };
+    predicted.iter().map(moved).collect()
 }
 
 fn carried_on(body: &BodyState, seconds: f64) -> BodyState {

@@ -53,9 +53,14 @@ async fn start_server() -> (ServerProcess, Observer) {
 
 /// The same, of a server that waits ten minutes for a silent player.
 async fn start_patient_server() -> (ServerProcess, Observer) {
+    start_configured("[sessions]\ninput_timeout_ms = 600000\n").await
+}
+
+/// The same, of a server with `configuration`.
+async fn start_configured(configuration: &str) -> (ServerProcess, Observer) {
     let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("patient.toml");
-    std::fs::write(&file, "[sessions]\ninput_timeout_ms = 600000\n").unwrap();
+    let file = folder.path().join("server.toml");
+    std::fs::write(&file, configuration).unwrap();
     observed(pita_server().arg("run").arg("--config").arg(&file)).await
 }
 

@@ -7,7 +7,7 @@ use rustix::process::kill_process;
 use serde_json::Value;
 
 use crate::run::{Ended, free_port, run};
-use crate::{LONG, await_clients, eventually, start_server};
+use crate::{LONG, await_clients, eventually, start_configured, start_server};
 
 #[test]
 fn a_short_load_test_measures_each_step_and_leaves_its_figures() {
@@ -49,7 +49,8 @@ async fn the_load_test_measures_a_running_server_and_leaves_it_running() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_lost_client_fails_the_load_test_after_its_report() {
-    let (server, observer) = start_server().await;
+    // Within a grace time a bot's connection would come back and its session go on.
+    let (server, observer) = start_configured("[sessions]\nresume_grace_ms = 0\n").await;
     let folder = tempfile::tempdir().unwrap();
     let mut command = load_test();
     command.args(["--connect", &server.endpoint, "--clients", "2", "--ticks", "200"]).arg("--out").arg(folder.path());

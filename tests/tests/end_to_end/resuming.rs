@@ -4,7 +4,7 @@ use pita_client::{ClientError, Session, SessionEvent};
 use pita_protocol::message::{Event, Refusal};
 
 use crate::clients::{ahead, connect, ground_distance, next_snapshot, position};
-use crate::{SOON, await_clients, eventually, observed, pita_server, start_server};
+use crate::{SOON, await_clients, eventually, start_configured, start_server};
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_cut_session_goes_on_in_the_same_car() {
@@ -51,10 +51,8 @@ async fn a_cut_session_goes_on_in_the_same_car() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn what_is_over_cannot_go_on_and_banned_names_stay_out() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("strict.toml");
-    std::fs::write(&file, "[sessions]\nresume_grace_ms = 0\n[bans]\nnames = [\"mallory\"]\n").unwrap();
-    let (server, observer) = observed(pita_server().arg("run").arg("--config").arg(&file)).await;
+    let strict = "[sessions]\nresume_grace_ms = 0\n[bans]\nnames = [\"mallory\"]\n";
+    let (server, observer) = start_configured(strict).await;
     let banned = Session::connect(&server.endpoint, "Mallory").await.expect_err("a banned name");
     assert!(matches!(banned, ClientError::Refused(Refusal::Banned { .. })), "{banned}");
 
