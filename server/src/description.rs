@@ -9,10 +9,9 @@ use pita_protocol::message::{ActorDescription, Description, Event, PartDescripti
 
 /// `arena` as it is now; the description's events begin at 0.
 pub fn describe(arena: &Arena) -> Description {
-    let of_static = |info: &pita_game::StaticInfo| StaticDescription {
-        shape: shape(&info.shape),
-        position: vector(info.position),
-        rotation: rotation(info.rotation),
+    let of_static = |info: &pita_game::StaticInfo| {
+        let (position, rotation) = (vector(info.position), rotation(info.rotation));
+        shapes(&info.shape).into_iter().map(move |shape| StaticDescription { shape, position, rotation })
     };
     Description {
         arena: arena.name().to_owned(),
@@ -20,20 +19,23 @@ pub fn describe(arena: &Arena) -> Description {
         tick: arena.tick(),
         event_sequence: 0,
         gravity: vector(arena.world().settings().gravity),
-        statics: arena.statics().iter().map(of_static).collect(),
+        statics: arena.statics().iter().flat_map(of_static).collect(),
         actors: arena.actors().map(actor).collect(),
     }
 }
 
 /// An actor in the words of the wire.
 pub fn actor(info: &ActorInfo) -> ActorDescription {
-    let part = |part: &pita_game::PartInfo| PartDescription { slice: part.slice, shape: shape(&part.shape) };
+    let part = |part: &pita_game::PartInfo| {
+        let slice = part.slice;
+        shapes(&part.shape).into_iter().map(move |shape| PartDescription { slice, shape })
+    };
     ActorDescription {
         id: info.id,
         kind: info.kind.to_owned(),
         name: info.name.clone(),
         slot: info.slot,
-        parts: info.parts.iter().map(part).collect(),
+        parts: info.parts.iter().flat_map(part).collect(),
     }
 }
 
@@ -61,8 +63,13 @@ pub fn actor_of(description: &Description, slot: u16) -> Option<u32> {
     description.actors.iter().find(|actor| actor.slot == Some(slot)).map(|actor| actor.id)
 }
 
-fn shape(shape: &pita_sim::Shape) -> Shape {
-    match shape {
+/// A shape in the words of the wire: a surface is a hull for each of its triangles.
+fn shapes(shape: &pita_sim::Shape) -> Vec<Shape> {
+    let shape = match shape {
+        pita_sim::Shape::Mesh(mesh) => {
+            let points = |triangle: &[u32; 3]| triangle.map(|corner| vector(mesh.vertices()[corner as usize])).to_vec();
+            return mesh.triangles().iter().map(|t| Shape::Hull { points: points(t), radius: 0.0 }).collect();
+        }
         pita_sim::Shape::HalfSpace { normal } => Shape::HalfSpace { normal: vector(*normal) },
         pita_sim::Shape::Ball { radius } => Shape::Ball { radius: *radius as f32 },
         pita_sim::Shape::Box { half } => Shape::Box { half: vector(*half) },
@@ -75,7 +82,8 @@ fn shape(shape: &pita_sim::Shape) -> Shape {
         pita_sim::Shape::Hull { points, radius } => {
             Shape::Hull { points: points.iter().copied().map(vector).collect(), radius: *radius as f32 }
         }
-    }
+    };
+    vec![shape]
 }
 
 fn vector(v: DVec3) -> [f32; 3] {

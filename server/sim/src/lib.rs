@@ -22,6 +22,7 @@ pub mod dof;
 mod eigen;
 mod elimination;
 mod error;
+pub mod geometry;
 pub mod integrate;
 mod island;
 pub mod mass;

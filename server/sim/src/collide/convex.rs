@@ -15,6 +15,9 @@ pub(super) const NAMELESS: u32 = u32::MAX;
 /// How much deeper than the nearest points a clipped point may be, m: rounding, and faces that are not quite flat.
 const DEEPER: f64 = 1e-6;
 
+/// Cosine of the least angle by which a constraint is said to turn a normal, 1.4 mrad.
+const STRAIGHT: f64 = 1.0 - 1e-6;
+
 /// A core at a place, with its extrusion radius, m.
 #[derive(Clone, Copy)]
 pub(super) struct Convex<'a> {
@@ -62,7 +65,11 @@ impl Finder {
         if b.constraints.is_some_and(|c| !c.project_local_normal2(&b_in_a, &mut normal, &mut normal_b)) {
             return Some(free);
         }
-        self.clip(&pair, normal, normal_b, nearest);
+        // Constraints round.
+        let is_turned = normal.dot(free) < STRAIGHT;
+        // What is nearest is not what looks along a normal that was turned.
+        let hints = if is_turned { pair.support(normal) } else { [on_a, on_b] };
+        self.clip(&pair, normal, normal_b, hints);
         out.normal = a.pose.rotation * normal;
         let mut offer = |on_a: DVec3, on_b: DVec3, along: f64, feature: u32| {
             if along >= gap - DEEPER && along - radii < margin {
@@ -72,22 +79,24 @@ impl Finder {
             }
         };
         for point in &self.clipped.points {
-            offer(point.local_p1, b_in_a * point.local_p2, point.dist, name(point.fid1, point.fid2));
+            // On a surface a point slides from triangle to triangle and stays what it is.
+            let feature = if b.constraints.is_some() { point.fid1.0 } else { name(point.fid1, point.fid2) };
+            offer(point.local_p1, b_in_a * point.local_p2, point.dist, feature);
         }
         // What a constraint turned is no distance any more.
-        if normal == free {
+        if !is_turned {
             offer(on_a, on_b, gap, NAMELESS);
         }
         Some(free)
     }
 
-    /// Where the faces that look along the normal lie above each other.
-    fn clip(&mut self, pair: &Pair, normal: DVec3, normal_b: DVec3, nearest: Nearest) {
+    /// Where the faces that look along the normal lie above each other, those near to two points.
+    fn clip(&mut self, pair: &Pair, normal: DVec3, normal_b: DVec3, [on_a, on_b]: [DVec3; 2]) {
         self.clipped.points.clear();
         let [face_a, face_b] = &mut self.faces;
         let b_in_a = pair.b_in_a;
-        pair.a.local_support_feature_toward(normal, nearest.on_a, face_a);
-        pair.b.local_support_feature_toward(normal_b, b_in_a.inverse_transform_point(nearest.on_b), face_b);
+        pair.a.local_support_feature_toward(normal, on_a, face_a);
+        pair.b.local_support_feature_toward(normal_b, b_in_a.inverse_transform_point(on_b), face_b);
         if face_a.num_vertices.min(face_b.num_vertices) > 1 {
             let (a_in_b, clipped) = (b_in_a.inverse(), &mut self.clipped);
             PolygonalFeature::contacts(b_in_a, &a_in_b, normal, normal_b, face_a, face_b, clipped, false);

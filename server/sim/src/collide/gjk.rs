@@ -59,7 +59,14 @@ pub(super) enum Found {
 impl Pair<'_> {
     /// How far apart the cores are along a unit normal, m.
     fn separation(&self, normal: DVec3) -> f64 {
-        -CsoPoint::from_shapes(self.b_in_a, self.a, self.b, normal).point.dot(normal)
+        let [on_a, on_b] = self.support(normal);
+        (on_b - on_a).dot(normal)
+    }
+
+    /// The points of both that reach farthest towards the other along a unit normal.
+    pub fn support(&self, normal: DVec3) -> [DVec3; 2] {
+        let CsoPoint { orig1, orig2, .. } = CsoPoint::from_shapes(self.b_in_a, self.a, self.b, normal);
+        [orig1, orig2]
     }
 
     /// The nearest points. `guess` is the normal of last time.
@@ -111,8 +118,8 @@ impl Pair<'_> {
 
     /// What a normal by itself says.
     fn along(&self, normal: DVec3) -> Nearest {
-        let CsoPoint { orig1, orig2, .. } = CsoPoint::from_shapes(self.b_in_a, self.a, self.b, normal);
-        Nearest { normal, gap: (orig2 - orig1).dot(normal), on_a: orig1, on_b: orig2 }
+        let [on_a, on_b] = self.support(normal);
+        Nearest { normal, gap: (on_b - on_a).dot(normal), on_a, on_b }
     }
 
     /// Turns the normal to where the cores are farthest apart.

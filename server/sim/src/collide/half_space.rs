@@ -17,7 +17,8 @@ pub(super) fn contacts(shape: &Shape, pose: Pose, origin: DVec3, normal: DVec3, 
         }
     };
     match shape {
-        Shape::HalfSpace { .. } => {}
+        // Neither moves.
+        Shape::HalfSpace { .. } | Shape::Mesh(_) => {}
         Shape::Ball { radius } => add(pose.position, *radius, 0),
         Shape::Box { half } => {
             for corner in 0..8u32 {

@@ -9,6 +9,9 @@ pub(crate) const POINTS_MAX: usize = 4;
 /// Most candidates that are looked at before the reduction.
 const CANDIDATES_MAX: usize = 16;
 
+/// Points of neighbouring triangles that are nearer to each other are one, m.
+const SAME_PLACE: f64 = 1e-6;
+
 /// A candidate for a contact point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ManifoldPoint {
@@ -29,6 +32,11 @@ pub(super) struct Manifold {
 }
 
 impl Manifold {
+    /// Without candidates.
+    pub fn along(normal: DVec3) -> Self {
+        Self { normal, ..Self::default() }
+    }
+
     /// Takes a candidate; where there are too many, the one with the widest gap goes.
     pub fn offer(&mut self, point: ManifoldPoint) {
         if self.points.try_push(point).is_err() {
@@ -36,6 +44,13 @@ impl Manifold {
             if let Some(widest) = widest.filter(|w| w.gap > point.gap) {
                 *widest = point;
             }
+        }
+    }
+
+    /// Takes a candidate unless there is one in its place.
+    pub fn offer_new(&mut self, point: ManifoldPoint) {
+        if self.points.iter().all(|other| other.position.distance_squared(point.position) > SAME_PLACE * SAME_PLACE) {
+            self.offer(point);
         }
     }
 

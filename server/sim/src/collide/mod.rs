@@ -15,10 +15,12 @@ pub mod kdop_tree;
 mod manifold;
 mod material;
 mod narrow_phase;
+mod patches;
 mod proximity;
 mod query;
 mod shape;
 mod trees;
+mod triangle_mesh;
 
 use std::collections::BTreeMap;
 
@@ -30,6 +32,7 @@ pub use material::{Material, MaterialId, Surface};
 pub use proximity::{At, Proximity, proximity};
 pub use query::{Nearest, QueryFilter, RayHit};
 pub use shape::{Collider, HULL_POINTS_MAX, Shape};
+pub use triangle_mesh::{Repairs, TRIANGLES_MAX, TriangleMesh};
 
 use crate::dof::{BodyId, Placed, Pose, Twist};
 use crate::error::{SimError, require_rotation, require_vector};

@@ -12,8 +12,10 @@ use super::collision::{Closest, Meeting, Phase, Touch};
 use super::convex::{Finder, NAMELESS};
 use super::half_space;
 use super::manifold::{Manifold, ManifoldPoint, POINTS_MAX};
+use super::patches::{PATCHES_MAX, Patches};
 use super::proximity::Proximity;
 use super::shape::{Collider, Shape};
+use super::triangle_mesh::TriangleMesh;
 use super::{ContactPoint, Moving, Partner, Surface};
 use crate::dof::Pose;
 use crate::potential::restitution::Blow;
@@ -67,12 +69,14 @@ pub(crate) type Key = (u32, Partner);
 #[derive(Clone, Copy)]
 struct Known {
     key: Key,
+    /// Which of the pair's patches: a surface of triangles may have several, everything else has the first alone.
+    patch: u8,
     place: Option<u32>,
 }
 
 impl Known {
-    fn key(&self) -> Key {
-        self.key
+    fn key(&self) -> (Key, u8) {
+        (self.key, self.patch)
     }
 }
 
@@ -86,11 +90,14 @@ pub(super) struct NarrowPhase {
     /// Pairs of this tick, in the order in which they were asked for; sorted by key at its end.
     pairs: Vec<Known>,
     /// Places of pairs that sleep.
-    asleep: BTreeMap<Key, u32>,
+    asleep: BTreeMap<(Key, u8), u32>,
     /// Places of pairs that ended, to be used again.
     spare: Vec<u32>,
     finder: Finder,
     manifold: Manifold,
+    patches: Patches,
+    /// Points of a pair's last tick that this tick has not taken over.
+    old: Vec<ContactPoint>,
 }
 
 impl NarrowPhase {
@@ -111,13 +118,13 @@ impl NarrowPhase {
     /// geometry.
     pub fn sleep(&mut self, sleeps: impl Fn(u32) -> bool) {
         let Self { pairs, asleep, .. } = self;
-        pairs.retain(|&Known { key: (a, b), place }| {
+        pairs.retain(|&Known { key: (a, b), patch, place }| {
             let partner_sleeps = match b {
                 Partner::Body(b) => sleeps(b),
                 Partner::Static(_) => true,
             };
             let both = partner_sleeps && sleeps(a);
-            asleep.extend(place.filter(|_| both).map(|place| ((a, b), place)));
+            asleep.extend(place.filter(|_| both).map(|place| (((a, b), patch), place)));
             !both
         });
     }
@@ -125,10 +132,11 @@ impl NarrowPhase {
     /// Colliders wake: the next pairs of theirs are found again.
     pub fn wake(&mut self, serials: impl Iterator<Item = u32>) {
         for serial in serials {
-            let first = (serial, Partner::Body(0));
-            while let Some((&key, _)) = self.asleep.range(first..).next().filter(|(key, _)| key.0 == serial) {
-                let place = self.asleep.remove(&key);
-                self.last.push(Known { key, place });
+            let first = ((serial, Partner::Body(0)), 0);
+            while let Some((&(key, patch), _)) = self.asleep.range(first..).next().filter(|(key, _)| key.0.0 == serial)
+            {
+                let place = self.asleep.remove(&(key, patch));
+                self.last.push(Known { key, patch, place });
             }
         }
         self.last.sort_unstable_by_key(Known::key);
@@ -140,7 +148,7 @@ impl NarrowPhase {
             margin((a.twist.linear - b.twist.linear).length(), reach(a, settings) + reach(b, settings), settings);
         self.manifold.clear();
         let key = (a.serial, Partner::Body(b.serial));
-        let pair = self.take(key, a.collider.is_sensor() || b.collider.is_sensor(), settings);
+        let pair = self.take(key, 0, a.collider.is_sensor() || b.collider.is_sensor(), settings);
         self.convex(pair, (a.collider, a.pose), (b.collider, b.pose), margin);
         self.update(key, pair, &Meeting { a, b: Some(b), surface }, settings);
         let pair = &self.memory[pair];
@@ -169,11 +177,14 @@ impl NarrowPhase {
             if self.manifold.reduced().is_empty() {
                 return;
             }
-            let pair = self.take(key, is_sensor, settings);
+            let pair = self.take(key, 0, is_sensor, settings);
             self.update(key, pair, &meeting, settings);
             return;
         }
-        let pair = self.take(key, is_sensor, settings);
+        if let Shape::Mesh(mesh) = piece.shape() {
+            return self.surface(key, is_sensor, (mesh, pose), margin, &meeting, settings);
+        }
+        let pair = self.take(key, 0, is_sensor, settings);
         self.convex(pair, (a.collider, a.pose), (piece, pose), margin);
         self.update(key, pair, &meeting, settings);
     }
@@ -181,7 +192,7 @@ impl NarrowPhase {
     /// Ends a tick: writes the points of all pairs that push, and what there is to tell of pairs, sorted by pair.
     pub fn finish(&mut self, contacts: &mut Vec<ContactPoint>, touches: &mut Vec<Touch>, settings: &Settings) {
         let Self { memory, last, pairs, spare, .. } = self;
-        for Known { key, place } in last.drain(..) {
+        for Known { key, place, .. } in last.drain(..) {
             let Some(place) = place else { continue };
             let pair = &mut memory[place as usize];
             pair.begin(settings);
@@ -189,7 +200,7 @@ impl NarrowPhase {
             spare.push(place);
         }
         pairs.sort_unstable_by_key(Known::key);
-        for &Known { key, place } in pairs.iter() {
+        for &Known { key, place, .. } in pairs.iter() {
             let Some(pair) = place.map(|place| &memory[place as usize]) else { continue };
             touches.extend(pair.tell(key));
             if !pair.is_sensor {
@@ -215,7 +226,7 @@ impl NarrowPhase {
     pub fn forget(&mut self, is_gone: impl Fn(Key) -> bool) {
         let Self { pairs, last, spare, .. } = self;
         for list in [pairs, last] {
-            list.retain(|&Known { key, place }| {
+            list.retain(|&Known { key, place, .. }| {
                 let gone = is_gone(key);
                 spare.extend(place.filter(|_| gone));
                 !gone
@@ -224,10 +235,10 @@ impl NarrowPhase {
     }
 
     /// Place in memory of a pair, with what the last tick left there where it has been one.
-    fn take(&mut self, key: Key, is_sensor: bool, settings: &Settings) -> usize {
-        let known = self.last.binary_search_by_key(&key, Known::key).ok();
+    fn take(&mut self, key: Key, patch: u8, is_sensor: bool, settings: &Settings) -> usize {
+        let known = self.last.binary_search_by_key(&(key, patch), Known::key).ok();
         let place = known.and_then(|i| self.last[i].place.take()).unwrap_or_else(|| self.blank());
-        self.pairs.push(Known { key, place: Some(place) });
+        self.pairs.push(Known { key, patch, place: Some(place) });
         let pair = &mut self.memory[place as usize];
         pair.begin(settings);
         pair.is_sensor = is_sensor;
@@ -246,12 +257,14 @@ impl NarrowPhase {
 
     /// The nearest points of two shapes.
     pub fn proximity(&mut self, a: (&Collider, Pose), b: (&Collider, Pose), margin: f64) -> Option<Proximity> {
+        if let (Shape::Mesh(mesh), Some(convex)) = (b.0.shape(), a.0.convex(a.1)) {
+            self.patches.find((a.0.shape(), convex, a.1), (mesh, b.1), margin, &mut self.finder);
+            return self.patches.found().iter_mut().filter_map(nearest_of).min_by(|p, q| p.gap.total_cmp(&q.gap));
+        }
         let pair = self.blank() as usize;
         self.manifold.clear();
         self.convex(pair, a, b, margin);
-        let normal = self.manifold.normal;
-        let nearest = self.manifold.reduced().iter().min_by(|a, b| a.gap.total_cmp(&b.gap))?;
-        Some(Proximity { gap: nearest.gap, normal, point: nearest.position })
+        nearest_of(&mut self.manifold)
     }
 
     /// Finds the manifold of two convex shapes.
@@ -263,40 +276,101 @@ impl NarrowPhase {
         }
     }
 
-    /// Makes contact points of the manifold's points, with the memory of those that were there last tick.
-    fn update(&mut self, (a, b): Key, pair: usize, meeting: &Meeting, settings: &Settings) {
-        let pair = &mut self.memory[pair];
-        let mut old = std::mem::take(&mut pair.points);
-        let single = self.manifold.reduced().len() == 1 && old.len() == 1;
-        let normal = self.manifold.normal;
-        for point in self.manifold.reduced() {
-            let known = old.iter().position(|o| {
-                let named = o.feature == point.feature && point.feature != NAMELESS;
-                let near = (o.position - point.position).length() < SAME_POINT;
-                single || named || (near && (o.feature == NAMELESS || point.feature == NAMELESS))
-            });
-            let (anchor, normal_force, blow) = known.map_or((DVec3::ZERO, 0.0, Blow::default()), |i| {
-                let memory = old.swap_remove(i);
-                (memory.anchor - normal * normal.dot(memory.anchor), memory.normal_force, memory.blow)
-            });
-            let ManifoldPoint { position, gap, feature } = *point;
-            let (surface, is_cancelled) = (meeting.surface, false);
-            let point = ContactPoint {
-                a,
-                b,
-                position,
-                normal,
-                gap,
-                surface,
-                anchor,
-                normal_force,
-                blow,
-                is_cancelled,
-                feature,
-            };
-            pair.points.push(point);
+    /// Contacts with a surface of triangles: a place in memory for every patch, and what is told of the pair at the first.
+    fn surface(
+        &mut self,
+        key: Key,
+        is_sensor: bool,
+        (mesh, pose): (&TriangleMesh, Pose),
+        margin: f64,
+        meeting: &Meeting,
+        settings: &Settings,
+    ) {
+        let first = self.take(key, 0, is_sensor, settings);
+        let mut places = ArrayVec::<usize, PATCHES_MAX>::from_iter([first]);
+        // A patch need not be in the place that it had: all of them remember together.
+        for patch in 1..PATCHES_MAX as u8 {
+            if self.last.binary_search_by_key(&(key, patch), Known::key).is_err() {
+                break;
+            }
+            places.push(self.take(key, patch, is_sensor, settings));
         }
+        self.old.clear();
+        places.iter().for_each(|&place| self.old.extend(self.memory[place].points.drain(..)));
+        let body = meeting.a;
+        let Some(convex) = body.collider.convex(body.pose) else { return };
+        let shape = (body.collider.shape(), convex, body.pose);
+        let count = self.patches.find(shape, (mesh, pose), margin, &mut self.finder).len();
+        for patch in places.len()..count {
+            places.push(self.take(key, patch as u8, is_sensor, settings));
+        }
+        let Self { memory, patches, old, .. } = self;
+        let touched = memory[first].last_touch.is_some();
+        let mut closest = None::<Closest>;
+        for (patch, &place) in patches.found().iter_mut().zip(&places) {
+            let points = &mut memory[place].points;
+            remember_points(key, patch, old, points, meeting.surface);
+            let here = meeting.closest(points, touched, settings);
+            let gap = |closest: &Option<Closest>| closest.map_or(f64::INFINITY, |closest| closest.gap);
+            if gap(&here) < gap(&closest) {
+                closest = here;
+            }
+        }
+        memory[first].touch = closest;
+    }
+
+    /// Makes contact points of the manifold's points.
+    fn update(&mut self, key: Key, pair: usize, meeting: &Meeting, settings: &Settings) {
+        let Self { memory, manifold, old, .. } = self;
+        let pair = &mut memory[pair];
+        old.clear();
+        old.extend(pair.points.drain(..));
+        remember_points(key, manifold, old, &mut pair.points, meeting.surface);
         pair.touch = meeting.closest(&pair.points, pair.last_touch.is_some(), settings);
+    }
+}
+
+/// The point of a manifold where the gap is least.
+fn nearest_of(manifold: &mut Manifold) -> Option<Proximity> {
+    let normal = manifold.normal;
+    let nearest = manifold.reduced().iter().min_by(|a, b| a.gap.total_cmp(&b.gap))?;
+    Some(Proximity { gap: nearest.gap, normal, point: nearest.position })
+}
+
+/// Makes contact points of a manifold's points, with the memory of those among the `old` that they are.
+fn remember_points(
+    (a, b): Key,
+    manifold: &mut Manifold,
+    old: &mut Vec<ContactPoint>,
+    points: &mut ArrayVec<ContactPoint, POINTS_MAX>,
+    surface: Surface,
+) {
+    let single = manifold.reduced().len() == 1 && old.len() == 1;
+    let normal = manifold.normal;
+    for &ManifoldPoint { position, gap, feature } in manifold.reduced() {
+        let known = old.iter().position(|o| {
+            let named = o.feature == feature && feature != NAMELESS;
+            let near = (o.position - position).length() < SAME_POINT;
+            single || named || (near && (o.feature == NAMELESS || feature == NAMELESS))
+        });
+        let (anchor, normal_force, blow) = known.map_or((DVec3::ZERO, 0.0, Blow::default()), |i| {
+            let memory = old.swap_remove(i);
+            (memory.anchor - normal * normal.dot(memory.anchor), memory.normal_force, memory.blow)
+        });
+        let is_cancelled = false;
+        points.push(ContactPoint {
+            a,
+            b,
+            position,
+            normal,
+            gap,
+            surface,
+            anchor,
+            normal_force,
+            blow,
+            is_cancelled,
+            feature,
+        });
     }
 }
 

@@ -208,6 +208,12 @@ impl Probe {
     /// How far a ray along the unit vector `direction` gets to a collider, and the normal of the surface there. Every step
     /// goes to the plane that tells the ray's end from the shape: never through the surface, and in a few steps to it.
     fn ray(&mut self, to: &Candidate, direction: DVec3, length: f64) -> Option<(f64, DVec3)> {
+        if let Shape::Mesh(mesh) = to.collider.shape() {
+            let to_mesh = to.pose.rotation.inverse();
+            let (from, along) = (to_mesh * (self.at - to.pose.position), to_mesh * direction);
+            let (way, normal) = mesh.ray(from, along, length)?;
+            return Some((way, to.pose.rotation * normal));
+        }
         let mut way = 0.0;
         for _ in 0..STEPS_MAX {
             let (distance, normal) = self.distance_at(self.at + direction * way, to, length - way + ARRIVED)?;

@@ -1,6 +1,7 @@
 //! Shapes: convex cores, spherically extruded (the talk's "points become spheres, edges become cylinders").
 
 use std::f64::consts::FRAC_PI_2;
+use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use parry3d_f64::math::Pose as ParryPose;
@@ -10,6 +11,7 @@ use super::convex::Convex;
 use super::core::{Core, Point, Polytope};
 use super::groups::Groups;
 use super::material::Material;
+use super::triangle_mesh::TriangleMesh;
 use crate::error::{SimError, require, require_vector};
 
 /// A collision shape in its body's frame, metres.
@@ -53,6 +55,8 @@ pub enum Shape {
         /// Extrusion radius; above 0 where the points lie in a plane.
         radius: f64,
     },
+    /// Surface of triangles; static only.
+    Mesh(Arc<TriangleMesh>),
 }
 
 /// Most vertices of a hull.
@@ -87,6 +91,8 @@ impl Shape {
                 require((0.0..1e6).contains(radius), "radius", *radius, "0 to below 1e6 m")?;
                 if *radius > 0.0 { Ok(()) } else { spans_a_volume(points) }
             }
+            // It was checked when it was made.
+            Self::Mesh(_) => Ok(()),
         }
     }
 
@@ -108,7 +114,8 @@ impl Shape {
             Self::Box { half } => half.length(),
             Self::Capsule { half_length, radius } => half_length + radius,
             Self::Cylinder { half_length, radius, .. } => half_length.hypot(*radius),
-            Self::Hull { points, radius } => points.iter().map(|p| p.length()).fold(0.0, f64::max) + radius,
+            Self::Hull { points, radius } => farthest(points) + radius,
+            Self::Mesh(mesh) => farthest(mesh.vertices()),
         }
     }
 
@@ -124,18 +131,18 @@ impl Shape {
                 along * (half_length - rounding) + across * (radius - rounding) + rounding
             }
             Self::Hull { points, radius } => {
-                let heights = points.iter().map(|p| p.dot(direction));
-                let ends = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-                return (ends.0 - radius, ends.1 + radius);
+                let (low, high) = ends(points, direction);
+                return (low - radius, high + radius);
             }
+            Self::Mesh(mesh) => return ends(mesh.vertices(), direction),
         };
         (-half, half)
     }
 
-    /// What is extruded, and by how much; `None` for a half-space.
+    /// What is extruded, and by how much; `None` for what is not convex, or has no bounds.
     fn core(&self) -> Option<(Core, f64)> {
         Some(match self {
-            Self::HalfSpace { .. } => return None,
+            Self::HalfSpace { .. } | Self::Mesh(_) => return None,
             Self::Ball { radius } => (Core::Point(Point), *radius),
             Self::Box { half } => (Core::Box(Cuboid::new(*half)), 0.0),
             Self::Capsule { half_length, radius } => {
@@ -155,6 +162,17 @@ impl Shape {
             _ => DQuat::IDENTITY,
         }
     }
+}
+
+/// Distance of the farthest of points from the origin, m.
+fn farthest(points: &[DVec3]) -> f64 {
+    points.iter().map(|p| p.length()).fold(0.0, f64::max)
+}
+
+/// Least and greatest coordinate of points along a direction, m.
+fn ends(points: &[DVec3], direction: DVec3) -> (f64, f64) {
+    let heights = points.iter().map(|p| p.dot(direction));
+    heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
 }
 
 const FLAT_HULL: &str = "points of a hull lie in a plane: give it a radius, or a point beside the plane";
@@ -251,15 +269,18 @@ impl Collider {
     /// [`Collider::validate`] for what moves.
     ///
     /// # Errors
-    /// As there, and for a half-space, which has no bounds.
+    /// As there, and for a half-space, which has no bounds, or a mesh, which has no inside.
     pub(crate) fn validate_moving(&self) -> Result<(), SimError> {
         match self.shape {
             Shape::HalfSpace { .. } => Err(SimError::Unusable { what: "a half-space cannot move: use a box" }),
+            Shape::Mesh(_) => {
+                Err(SimError::Unusable { what: "a surface of triangles cannot move: use its convex parts" })
+            }
             _ => self.validate(),
         }
     }
 
-    /// The shape for the fine phase, given the body's pose; `None` for a half-space.
+    /// The shape for the fine phase, given the body's pose; `None` for what is not convex.
     pub(super) fn convex(&self, pose: crate::dof::Pose) -> Option<Convex<'_>> {
         let (core, radius, rotation) = self.core.as_ref()?;
         let pose = ParryPose::from_parts(pose.position, pose.rotation * *rotation);

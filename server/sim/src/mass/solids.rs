@@ -10,7 +10,7 @@ use super::{Density, MassProperties, rounding};
 use crate::collide::Shape;
 use crate::error::SimError;
 
-const NO_MASS: &str = "a half-space has no mass";
+const NO_MASS: &str = "a half-space or a surface has no mass";
 
 impl Shape {
     /// Mass, centre and second moments of the solid, rounded edges and extrusion included.
@@ -19,10 +19,10 @@ impl Shape {
     ///
     /// # Errors
     /// [`SimError`] naming the size that is out of range, a density that is not above 0 everywhere in the shape, a flat
-    /// hull, or a half-space, which has no mass.
+    /// hull, or a half-space or a mesh, which have no mass.
     pub fn mass_properties(&self, density: Density) -> Result<MassProperties, SimError> {
         self.validate()?;
-        if let Self::HalfSpace { .. } = self {
+        if let Self::HalfSpace { .. } | Self::Mesh(_) = self {
             return Err(SimError::Unusable { what: NO_MASS });
         }
         density.require_positive(-self.reach(-density.direction()))?;
@@ -32,7 +32,7 @@ impl Shape {
     /// Moments of inertia about the body's axes through the centre of mass, of the homogeneous solid of `mass` kg,
     /// kg m².
     ///
-    /// A half-space has none, nor has a hull that is none: zero. The axes of a hull need not be principal: those of
+    /// A half-space and a mesh have none, nor has a hull that is none: zero. The axes of a hull need not be principal: those of
     /// [`Shape::mass_properties`] are.
     pub fn inertia(&self, mass: f64) -> DVec3 {
         self.integrate(Density::constant(1.0)).map_or(DVec3::ZERO, |unit| {
@@ -43,7 +43,7 @@ impl Shape {
 
     fn integrate(&self, density: Density) -> Result<MassProperties, SimError> {
         let (volume, squares) = match *self {
-            Self::HalfSpace { .. } => return Err(SimError::Unusable { what: NO_MASS }),
+            Self::HalfSpace { .. } | Self::Mesh(_) => return Err(SimError::Unusable { what: NO_MASS }),
             Self::Hull { ref points, radius } => return hull(points, radius, density),
             Self::Ball { radius } => ball(radius),
             Self::Box { half } => block(half),
@@ -60,7 +60,7 @@ impl Shape {
     /// How far the shape reaches from the origin along a unit direction, m.
     fn reach(&self, d: DVec3) -> f64 {
         match *self {
-            Self::HalfSpace { .. } => f64::INFINITY,
+            Self::HalfSpace { .. } | Self::Mesh(_) => f64::INFINITY,
             Self::Ball { radius } => radius,
             Self::Box { half } => half.dot(d.abs()),
             Self::Capsule { half_length, radius } => half_length * d.x.abs() + radius,

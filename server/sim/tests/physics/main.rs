@@ -22,6 +22,7 @@ mod sheep;
 mod sheep_forms;
 mod sleep;
 mod solvers;
+mod surfaces;
 mod tolerance;
 mod wheels;
 
