@@ -10,7 +10,7 @@ use super::{Density, MassProperties, rounding};
 use crate::collide::Shape;
 use crate::error::SimError;
 
-const NO_MASS: &str = "a half-space or a surface has no mass";
+const NO_MASS: &str = "a half-space has no mass, nor has a surface";
 
 impl Shape {
     /// Mass, centre and second moments of the solid, rounded edges and extrusion included.
