@@ -1,19 +1,17 @@
 //! How a session comes about on an open connection: find the arena, listen for events, join, declare the rest.
 
 use std::{
-    sync::{Arc, Mutex},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
 use pita_protocol::{
     Keys, keys,
-    message::{ArenaSource, JoinAccepted, JoinReply, JoinRequest, Role, Status},
+    message::{JoinAccepted, JoinReply, JoinRequest, Role, Status},
 };
 use tokio::sync::mpsc;
 use zenoh::{liveliness::LivelinessToken, pubsub::Subscriber};
 
-#[cfg(feature = "prediction")]
-use crate::prediction::Predictor;
 use crate::{
     builder::SessionBuilder,
     conditioner::{ConditionerSettings, Delivery, Link},
@@ -25,6 +23,8 @@ use crate::{
     transport,
     wire::Wire,
 };
+#[cfg(feature = "prediction")]
+use {crate::prediction::Predictor, pita_protocol::message::ArenaSource, std::sync::Mutex};
 
 /// What is declared for as long as a session lives.
 #[derive(Debug)]
