@@ -152,7 +152,7 @@ impl Default for SolverSettings {
 
 impl Default for SleepSettings {
     fn default() -> Self {
-        Self { linear_speed: 5e-3, angular_speed: 2e-2, time: 0.5 }
+        Self { linear_speed: 1e-2, angular_speed: 2e-2, time: 0.5 }
     }
 }
 

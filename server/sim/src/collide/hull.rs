@@ -28,7 +28,7 @@ impl<'a> Bodies<'a> {
     }
 
     /// Where a collider is and how it moves; `None` where its body takes no part.
-    fn motion(self, placed: &Placed) -> Option<(Pose, Twist)> {
+    pub fn motion(self, placed: &Placed) -> Option<(Pose, Twist)> {
         let body = self.bodies.get(placed.body).filter(|body| !body.quarantined)?;
         let Some(figure) = &body.figure else { return Some((body.pose(self.state), body.twist(self.state))) };
         let frame = figure.dof.frame(placed.at, self.state.q(body.slice), self.state.v(body.slice));

@@ -1,6 +1,7 @@
 //! Collision detection: which DOF are incompatible, and where.
 //!
-//! Once a tick, at Q0, with margins that cover the tick's motion: three `trees` of k-DOPs prune, `narrow_phase` finds the
+//! Once a tick, at Q0, with margins that cover the tick's motion, and again (`second_look`) where the solver puts what
+//! moves far: three `trees` of k-DOPs prune, `narrow_phase` finds the
 //! points. What comes out are contact points; [`potential::contact`](crate::potential) makes potentials of them.
 
 mod collision;
@@ -18,6 +19,7 @@ mod narrow_phase;
 mod patches;
 mod proximity;
 mod query;
+mod second_look;
 mod shape;
 mod trees;
 mod triangle_mesh;
@@ -41,8 +43,10 @@ use crate::settings::Settings;
 use collision::{Closest, Touch};
 pub(crate) use hull::Bodies;
 use kdop::Kdop;
+use manifold::ManifoldPoint;
 use material::MaterialTable;
-use narrow_phase::NarrowPhase;
+use narrow_phase::{Key, NarrowPhase};
+pub(crate) use second_look::{Candidates, SecondPoint};
 use trees::Trees;
 
 slotmap::new_key_type! {
@@ -123,6 +127,8 @@ pub(crate) struct ContactPoint {
     pub normal_force: f64,
     /// That the two gave each other in the last tick.
     pub blow: Blow,
+    /// Where the solver put its bodies, as its linear model has it, m.
+    pub believed_gap: f64,
     /// Logic lets the pair pass in this tick.
     pub is_cancelled: bool,
     feature: u32,
@@ -134,13 +140,19 @@ impl ContactPoint {
         self.a == other.a && self.b == other.b
     }
 
+    /// A point of a pair that has no history.
+    fn fresh((a, b): Key, normal: DVec3, point: &ManifoldPoint, surface: Surface) -> Self {
+        let ManifoldPoint { position, gap, feature } = *point;
+        let (anchor, normal_force, blow, believed_gap) = (DVec3::ZERO, 0.0, Blow::default(), gap);
+        let is_cancelled = false;
+        Self { a, b, position, normal, gap, surface, anchor, normal_force, blow, believed_gap, is_cancelled, feature }
+    }
+
     /// A new point without a history between bodies that do not matter.
     #[cfg(test)]
     pub fn at(position: DVec3, normal: DVec3, gap: f64, friction: f64) -> Self {
-        let (a, b, feature, is_cancelled) = (0, Partner::Static(0), 0, false);
-        let surface = Material::from(friction).surface;
-        let (anchor, normal_force, blow) = (DVec3::ZERO, 0.0, Blow::default());
-        Self { a, b, position, normal, gap, surface, anchor, normal_force, blow, is_cancelled, feature }
+        let point = ManifoldPoint { position, gap, feature: 0 };
+        Self::fresh((0, Partner::Static(0)), normal, &point, Material::from(friction).surface)
     }
 }
 
@@ -177,6 +189,8 @@ pub(crate) struct Detector {
     pub contacts: Vec<ContactPoint>,
     /// Bodies that something touched in their sleep.
     pub touched: Vec<BodyId>,
+    /// Points that the second look of this tick added.
+    pub second: Vec<SecondPoint>,
     /// What there is to tell of pairs in this tick, in order of pair.
     touches: Vec<Touch>,
     /// Counts detections.

@@ -255,16 +255,28 @@ impl NarrowPhase {
         self.memory.len() as u32 - 1
     }
 
-    /// The nearest points of two shapes.
+    /// The nearest points of two shapes; nothing is remembered of them.
     pub fn proximity(&mut self, a: (&Collider, Pose), b: (&Collider, Pose), margin: f64) -> Option<Proximity> {
         if let (Shape::Mesh(mesh), Some(convex)) = (b.0.shape(), a.0.convex(a.1)) {
             self.patches.find((a.0.shape(), convex, a.1), (mesh, b.1), margin, &mut self.finder);
             return self.patches.found().iter_mut().filter_map(nearest_of).min_by(|p, q| p.gap.total_cmp(&q.gap));
         }
-        let pair = self.blank() as usize;
-        self.manifold.clear();
-        self.convex(pair, a, b, margin);
+        self.look(a, b, margin);
         nearest_of(&mut self.manifold)
+    }
+
+    /// Where two colliders are within `margin` of one another; nothing is remembered of it. Answers the normal from the
+    /// first to the second, and points; none for surfaces of triangles.
+    pub fn look(&mut self, a: (&Collider, Pose), b: (&Collider, Pose), margin: f64) -> (DVec3, &[ManifoldPoint]) {
+        let Self { finder, manifold, .. } = self;
+        manifold.clear();
+        if let Shape::HalfSpace { normal } = b.0.shape() {
+            let normal = b.1.rotation * *normal;
+            half_space::contacts(a.0.shape(), a.1, b.1.position, normal, margin, manifold);
+        } else if let (Some(a), Some(b)) = (a.0.convex(a.1), b.0.convex(b.1)) {
+            finder.contacts(a, b, margin, None, manifold);
+        }
+        (manifold.normal, manifold.reduced())
     }
 
     /// Finds the manifold of two convex shapes.
@@ -339,7 +351,7 @@ fn nearest_of(manifold: &mut Manifold) -> Option<Proximity> {
 
 /// Makes contact points of a manifold's points, with the memory of those among the `old` that they are.
 fn remember_points(
-    (a, b): Key,
+    key: Key,
     manifold: &mut Manifold,
     old: &mut Vec<ContactPoint>,
     points: &mut ArrayVec<ContactPoint, POINTS_MAX>,
@@ -347,30 +359,18 @@ fn remember_points(
 ) {
     let single = manifold.reduced().len() == 1 && old.len() == 1;
     let normal = manifold.normal;
-    for &ManifoldPoint { position, gap, feature } in manifold.reduced() {
+    for point in manifold.reduced() {
         let known = old.iter().position(|o| {
-            let named = o.feature == feature && feature != NAMELESS;
-            let near = (o.position - position).length() < SAME_POINT;
-            single || named || (near && (o.feature == NAMELESS || feature == NAMELESS))
+            let named = o.feature == point.feature && point.feature != NAMELESS;
+            let near = (o.position - point.position).length() < SAME_POINT;
+            single || named || (near && (o.feature == NAMELESS || point.feature == NAMELESS))
         });
         let (anchor, normal_force, blow) = known.map_or((DVec3::ZERO, 0.0, Blow::default()), |i| {
             let memory = old.swap_remove(i);
             (memory.anchor - normal * normal.dot(memory.anchor), memory.normal_force, memory.blow)
         });
-        let is_cancelled = false;
-        points.push(ContactPoint {
-            a,
-            b,
-            position,
-            normal,
-            gap,
-            surface,
-            anchor,
-            normal_force,
-            blow,
-            is_cancelled,
-            feature,
-        });
+        let fresh = ContactPoint::fresh(key, normal, point, surface);
+        points.push(ContactPoint { anchor, normal_force, blow, ..fresh });
     }
 }
 

@@ -250,6 +250,22 @@ impl Trees {
         self.arrivals.iter().map(|&key| self.hull(key))
     }
 
+    /// All hulls that are awake.
+    pub fn awake(&self) -> impl Iterator<Item = &Hull> {
+        self.awake.iter().map(|&key| self.hull(key))
+    }
+
+    /// All pairs of hulls that are awake and whose bounds overlap, whatever the round.
+    pub fn pairs_awake(&self) -> impl Iterator<Item = [&Hull; 2]> {
+        self.near.iter().map(|pair| pair.map(|key| self.hull(key))).filter(|[a, b]| a.bounds.overlaps(&b.bounds))
+    }
+
+    /// All hulls that are awake and pieces of static geometry whose bounds overlap, whatever the round.
+    pub fn pairs_awake_with_fixed(&self) -> impl Iterator<Item = (&Hull, StaticId)> {
+        let pairs = self.near_fixed.iter().map(|&[hull, piece]| (self.hull(hull), &self.pieces[piece as usize]));
+        pairs.filter(|(hull, piece)| hull.bounds.overlaps(&piece.bounds)).map(|(hull, piece)| (hull, piece.id))
+    }
+
     /// Pairs of hulls of this round whose bounds overlap, the smaller serial first; and of such hulls with sleepers, whose
     /// body is told.
     pub fn pairs(&self) -> impl Iterator<Item = ([&Hull; 2], Option<BodyId>)> {

@@ -31,10 +31,20 @@ pub(super) struct Active {
 
 /// Where a potential acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Spot {
+pub(super) enum Spot {
     World,
     /// The body with this index among the active ones.
     Body(u32, PartPoint),
+}
+
+impl Spot {
+    /// The body that it is on.
+    pub fn body(self) -> Option<u32> {
+        match self {
+            Self::World => None,
+            Self::Body(index, _) => Some(index),
+        }
+    }
 }
 
 impl Integrator {
@@ -53,20 +63,7 @@ impl Integrator {
     }
 
     pub(super) fn build_islands(&mut self, scene: &Scene) {
-        self.islands.begin(self.active.len());
-        let figures = (0..).zip(&self.active).filter(|(_, active)| scene.bodies[active.id].figure.is_some());
-        figures.for_each(|(index, _)| self.islands.touch(index));
-        let contacts = scene.contacts.chunk_by(ContactPoint::same_pair).map(|points| contact_spots(scene, &points[0]));
-        let anchors = scene.potentials.pairs().map(|[a, b]| Some([spot(scene, a)?, spot(scene, b)?]));
-        for spots in contacts.chain(anchors).flatten() {
-            match spots {
-                [Spot::Body(a, _), Spot::Body(b, _)] => self.islands.couple(a, b),
-                [Spot::Body(a, _), Spot::World] | [Spot::World, Spot::Body(a, _)] => self.islands.touch(a),
-                [Spot::World, Spot::World] => {}
-            }
-        }
-        self.islands.finish();
-        self.solves.resize_with(self.islands.len().max(self.solves.len()), Solve::default);
+        self.find_islands(scene);
         for (island, solve) in self.solves.iter_mut().take(self.islands.len()).enumerate() {
             solve.clear(scene.settings);
             for &member in self.islands.members(island) {
@@ -76,13 +73,35 @@ impl Integrator {
         }
     }
 
-    /// The island of two spots, and their ends in it. `frozen` ends keep the derivatives of the start.
-    fn localise(&mut self, spots: [Spot; 2], frozen: bool) -> Option<(&mut Solve, [End; 2])> {
+    /// Finds out what is coupled.
+    pub(super) fn find_islands(&mut self, scene: &Scene) {
+        self.islands.begin(self.active.len());
+        let figures = (0..).zip(&self.active).filter(|(_, active)| scene.bodies[active.id].figure.is_some());
+        figures.for_each(|(index, _)| self.islands.touch(index));
+        let contacts = scene.contacts.chunk_by(ContactPoint::same_pair).map(|points| contact_spots(scene, &points[0]));
+        let anchors = scene.potentials.pairs().map(|[a, b]| Some([spot(scene, a)?, spot(scene, b)?]));
+        let second = scene.second.iter().map(|point| contact_spots(scene, &point.contact));
+        for spots in contacts.chain(second).chain(anchors).flatten() {
+            match spots {
+                [Spot::Body(a, _), Spot::Body(b, _)] => self.islands.couple(a, b),
+                [Spot::Body(a, _), Spot::World] | [Spot::World, Spot::Body(a, _)] => self.islands.touch(a),
+                [Spot::World, Spot::World] => {}
+            }
+        }
+        self.islands.finish();
+        self.solves.resize_with(self.islands.len().max(self.solves.len()), Solve::default);
+    }
+
+    /// The island of two spots, and their ends in it; `None` where that has all its potentials already. `frozen` ends keep the derivatives of the start.
+    pub(super) fn localise(&mut self, spots: [Spot; 2], frozen: bool) -> Option<(&mut Solve, [End; 2])> {
         let island = |spot: Spot| match spot {
             Spot::World => Islands::FREE,
             Spot::Body(index, _) => self.islands.island_of(index),
         };
         let solve = self.solves.get_mut(island(spots[0]).min(island(spots[1])) as usize)?;
+        if !solve.is_gathering {
+            return None;
+        }
         let mut end = |spot: Spot| match spot {
             Spot::World => End { frame: FIXED, point: DVec3::ZERO },
             Spot::Body(index, at) => match self.active[index as usize] {
@@ -111,6 +130,7 @@ impl Integrator {
 
     pub(super) fn gather_potentials(&mut self, scene: &Scene) {
         self.gather_contacts(scene);
+        self.gather_second(scene);
         let Settings { dt, solver, .. } = scene.settings;
         for (_, desc) in scene.potentials.springs.awake() {
             let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
@@ -155,6 +175,9 @@ impl Integrator {
             let body = &scene.bodies[active.id];
             let Some(figure) = &body.figure else { continue };
             let solve = &mut self.solves[self.islands.island_of(index) as usize];
+            if !solve.is_gathering {
+                continue;
+            }
             let q = scene.state.q(body.slice);
             let rods = (0u32..).zip(figure.dof.rods()).zip(&figure.rods);
             for ((index, rod), &memory) in rods {
@@ -193,11 +216,25 @@ impl Integrator {
             solve.contacts.extend(sources);
         }
     }
+
+    /// Points of the second look. They come after all contacts.
+    fn gather_second(&mut self, scene: &Scene) {
+        for (point, source) in scene.second.iter().zip(0..) {
+            let Some(spots) = contact_spots(scene, &point.contact) else { continue };
+            let Some((solve, ends)) = self.localise(spots, true) else { continue };
+            let (frames, mass) = (ends.map(|end| end.frame), solve.reduced_mass(ends));
+            let arm = |i: usize| if solve.turns(ends[i]) { point.arms[i] } else { DVec3::ZERO };
+            let Settings { dt, contact: settings, .. } = scene.settings;
+            let term = ContactTerm::second(frames, point, [arm(0), arm(1)], mass, settings, *dt);
+            solve.problem.terms.contacts.push(term);
+            solve.second.push(source);
+        }
+    }
 }
 
 impl Solve {
     /// Takes a body into the island, with its share of all `unknowns`.
-    fn take_in(&mut self, active: &mut Active, scene: &Scene) {
+    pub(super) fn take_in(&mut self, active: &mut Active, scene: &Scene) {
         let (dt, gravity) = (scene.settings.dt, scene.settings.field());
         let body = &scene.bodies[active.id];
         let start = self.problem.unknowns.len();
@@ -260,7 +297,7 @@ impl Solve {
     }
 
     /// Reduced mass of two ends, kg; of the one that moves where the other is the world.
-    fn reduced_mass(&self, [a, b]: [End; 2]) -> f64 {
+    pub(super) fn reduced_mass(&self, [a, b]: [End; 2]) -> f64 {
         (self.mass(a).recip() + self.mass(b).recip()).recip()
     }
 
@@ -358,7 +395,7 @@ fn spot(scene: &Scene, anchor: Anchor) -> Option<Spot> {
 }
 
 /// Where a contact acts: at the frames of the two colliders; nowhere if logic lets the pair pass.
-fn contact_spots(scene: &Scene, contact: &ContactPoint) -> Option<[Spot; 2]> {
+pub(super) fn contact_spots(scene: &Scene, contact: &ContactPoint) -> Option<[Spot; 2]> {
     if contact.is_cancelled {
         return None;
     }

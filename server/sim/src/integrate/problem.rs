@@ -104,12 +104,16 @@ pub(super) enum Guess {
     Rest,
     /// Last tick's impulses once more.
     Repeated,
+    /// Where the last solve of this tick ended.
+    Solution,
 }
 
 impl Unknown {
     fn guess<const D: usize>(&self, guess: Guess) -> Entry<D> {
         match (self, guess) {
             (Self::Body(node), Guess::Target) => entry_of(node.start_from(node.target)),
+            // Known to the problem, not to its unknowns.
+            (_, Guess::Solution) => [0.0; D],
             (Self::Body(node), Guess::Before) => entry_of(node.start_from(node.before)),
             (Self::Body(node), Guess::Rest) => entry_of(node.start_from(Twist::REST)),
             (Self::Body(node), Guess::Repeated) => entry_of(node.repeated()),
@@ -183,6 +187,8 @@ pub(crate) struct Problem {
     pub figures: Figures,
     /// At the candidate state: one for every unknown, then one for every attachment. After solving, at the end of the tick.
     pub frames: Vec<Frame<f64>>,
+    /// Where a solve of this tick ended; empty before. Numbers beyond a block's size are zero.
+    pub(super) solution: Vec<[f64; BLOCK_RATES_MAX]>,
     pub(super) products: ProductMemory,
 }
 
@@ -203,6 +209,7 @@ impl Problem {
         self.terms.clear();
         self.figures.clear();
         self.frames.clear();
+        self.solution.clear();
     }
 
     /// Blocks of unknowns.
@@ -214,7 +221,9 @@ impl Problem {
     /// did; only an impact makes a difference that the first iteration does not mend, and what figures of parts do to
     /// themselves, at their joints' limits, is not seen from here.
     pub(super) fn guesses(&self) -> &'static [Guess] {
-        if self.figures.have_parts() || self.terms.contacts.iter().any(ContactTerm::is_impact) {
+        if !self.solution.is_empty() {
+            &[Guess::Solution]
+        } else if self.figures.have_parts() || self.terms.contacts.iter().any(ContactTerm::is_impact) {
             &[Guess::Repeated, Guess::Before, Guess::Target, Guess::Rest]
         } else if self.unknowns.iter().all(Unknown::rests) {
             &[Guess::Rest, Guess::Repeated]
@@ -226,7 +235,35 @@ impl Problem {
     /// Replaces `u` by a guess.
     pub(super) fn guess<const D: usize>(&self, guess: Guess, u: &mut Vec<Entry<D>>) {
         u.clear();
-        u.extend(self.unknowns.iter().map(|unknown| unknown.guess(guess)));
+        if guess == Guess::Solution {
+            u.extend(self.solution.iter().map(leading));
+        } else {
+            u.extend(self.unknowns.iter().map(|unknown| unknown.guess(guess)));
+        }
+    }
+
+    /// Where a solve of this tick ended, from unknown `start` on.
+    pub(super) fn solution(&self, start: usize) -> &[[f64; BLOCK_RATES_MAX]] {
+        &self.solution[start..]
+    }
+
+    /// Unknowns from number `known` on start at `solution`, without one at the motion without potentials.
+    pub(super) fn start_from(&mut self, known: usize, solution: Option<&[[f64; BLOCK_RATES_MAX]]>) {
+        let new = &self.unknowns[known..];
+        match solution {
+            Some(solution) => self.solution.extend_from_slice(&solution[..new.len()]),
+            None => self.solution.extend(new.iter().map(|unknown| unknown.guess(Guess::Target))),
+        }
+    }
+
+    /// Remembers where a solve ended, in case that it is to go on from there.
+    pub(super) fn remember_solution<const D: usize>(&mut self, u: &[Entry<D>]) {
+        self.solution.clear();
+        self.solution.extend(u.iter().map(|entry| {
+            let mut rates = [0.0; BLOCK_RATES_MAX];
+            rates[..D].copy_from_slice(entry);
+            rates
+        }));
     }
 
     /// Moves the candidate to the rates `u`.

@@ -10,8 +10,9 @@ use slotmap::SlotMap;
 use super::StepReport;
 use super::gather::Active;
 use super::problem::{Problem, Unknown};
+use super::second_look::Onward;
 use super::solver::{SolveReport, Solvers, StoppedBecause};
-use crate::collide::ContactPoint;
+use crate::collide::{ContactPoint, SecondPoint};
 use crate::dof::{Body, BodyId, Placed, Twist};
 use crate::island::Islands;
 use crate::potential::hold::{Joint, Memory};
@@ -35,6 +36,8 @@ pub(crate) struct Scene<'a> {
     pub placed: &'a [Placed],
     pub potentials: &'a mut Potentials,
     pub contacts: &'a mut [ContactPoint],
+    /// Points of the second look.
+    pub second: &'a mut [SecondPoint],
 }
 
 /// The solvers' memory. Nothing in it lasts longer than a solve, so islands share it: it stays in the cache.
@@ -50,11 +53,16 @@ pub(super) struct Solve {
     pub problem: Problem,
     /// Share of the tick's budget, block operations.
     budget: Option<u64>,
-    report: SolveReport,
+    pub report: SolveReport,
+    /// Whether it takes in potentials, and whether it is to be solved.
+    pub is_gathering: bool,
+    pub is_pending: bool,
     /// Of the island, kg.
     pub mass: f64,
     /// Index of each contact term among the world's contacts.
     pub contacts: Vec<u32>,
+    /// Index of each contact term after those among the points of the second look.
+    pub second: Vec<u32>,
     pub rods: Vec<RodId>,
     /// Body and index of each rod of a figure.
     pub own_rods: Vec<(BodyId, u32)>,
@@ -74,6 +82,7 @@ pub(crate) struct Integrator {
     /// Bodies that take part, in order of serial.
     pub(super) active: Vec<Active>,
     pub(super) solves: Vec<Solve>,
+    pub(super) onward: Onward,
     pool: Option<rayon::ThreadPool>,
     /// One for the calling thread and for each of the pool.
     workspace: Workspace,
@@ -90,17 +99,15 @@ impl Integrator {
         Ok(Self { pool, pool_workspaces, ..Self::default() })
     }
 
-    /// Integrates one tick.
-    pub fn step(&mut self, scene: &mut Scene) -> StepReport {
+    /// Gathers and solves a tick. What comes of it is written by [`Integrator::scatter`].
+    pub fn begin(&mut self, scene: &mut Scene) {
         self.gather(scene);
         self.solve(scene.settings);
-        self.scatter(scene)
     }
 
     /// Solves one tick, and leaves everything as it was. Answers what the solver did.
     pub fn rehearse(&mut self, scene: &mut Scene) -> StepReport {
-        self.gather(scene);
-        self.solve(scene.settings);
+        self.begin(scene);
         let mut report = StepReport { bodies: self.active.len(), ..StepReport::default() };
         self.sum_up(&mut report);
         report
@@ -123,6 +130,7 @@ impl Integrator {
     }
 
     fn gather(&mut self, scene: &mut Scene) {
+        self.onward.spent = SolveReport::default();
         self.gather_bodies(scene);
         self.build_islands(scene);
         self.gather_potentials(scene);
@@ -130,12 +138,13 @@ impl Integrator {
 
     fn sum_up(&self, report: &mut StepReport) {
         report.islands = self.islands.len();
+        self.onward.spent.add_to(report);
         for solve in &self.solves[..self.islands.len()] {
             solve.sum_up(report);
         }
     }
 
-    fn solve(&mut self, settings: &Settings) {
+    pub(super) fn solve(&mut self, settings: &Settings) {
         let solves = &mut self.solves[..self.islands.len()];
         share_budget(solves, settings.solver.budget);
         let solver = &settings.solver;
@@ -154,7 +163,8 @@ impl Integrator {
         }
     }
 
-    fn scatter(&mut self, scene: &mut Scene) -> StepReport {
+    /// Writes what the solver came to.
+    pub fn scatter(&mut self, scene: &mut Scene) -> StepReport {
         let mut report = StepReport::default();
         self.sum_up(&mut report);
         for &id in scene.order {
@@ -218,7 +228,10 @@ fn land(
 
 impl Workspace {
     fn solve(&mut self, solve: &mut Solve, settings: &SolverSettings) {
-        let Solve { problem, budget, report, .. } = solve;
+        let Solve { problem, budget, report, is_pending, .. } = solve;
+        if !std::mem::take(is_pending) {
+            return;
+        }
         *report = if problem.unknowns.iter().any(Unknown::is_wide) {
             self.rigid.solve(problem, settings, *budget)
         } else {
@@ -232,7 +245,10 @@ impl Solve {
     pub fn clear(&mut self, settings: &Settings) {
         self.problem.clear(settings.dt, settings.field());
         self.mass = 0.0;
+        (self.is_gathering, self.is_pending) = (true, true);
+        self.report = SolveReport::default();
         self.contacts.clear();
+        self.second.clear();
         self.rods.clear();
         self.own_rods.clear();
         self.ball_joints.clear();
@@ -252,8 +268,9 @@ impl Solve {
             contact.anchor = finite_or_zero(term.final_anchor(dt, at));
             contact.blow = term.final_blow(dt, at);
             contact.normal_force = finite_or_zero(DVec3::X * term.normal_force(dt, at)).x;
-            report.worst_penetration = report.worst_penetration.max(term.final_depth(dt, at));
         }
+        let depths = problem.terms.contacts.iter().map(|term| term.final_depth(dt, problem.pair(term)));
+        report.worst_penetration = depths.fold(report.worst_penetration, f64::max);
         let potentials = &mut *scene.potentials;
         for (term, &id) in problem.terms.rods.iter().zip(&self.rods) {
             potentials.rods[id].memory = account(problem, term, report);
@@ -291,13 +308,9 @@ impl Solve {
     }
 
     fn sum_up(&self, report: &mut StepReport) {
-        report.contacts += self.contacts.len();
-        let SolveReport { iterations, linear_iterations, evaluations, work, residual, stopped_because, .. } =
-            self.report;
-        report.iterations += iterations;
-        report.linear_iterations += linear_iterations;
-        report.evaluations += evaluations;
-        report.work += work;
+        report.contacts += self.problem.terms.contacts.len();
+        self.report.add_to(report);
+        let SolveReport { residual, stopped_because, .. } = self.report;
         report.unconverged_islands += usize::from(stopped_because != StoppedBecause::Tolerance);
         report.out_of_budget_islands += usize::from(stopped_because == StoppedBecause::Budget);
         report.residual = report.residual.max(residual);

@@ -10,6 +10,7 @@ use glam::{DMat3, DVec3};
 use super::restitution::{Blow, Rebound};
 use super::{FIXED, FrameIndex, PairBlocks, Term, Wrench, outer};
 use crate::autodiff::{Scalar, Vec3};
+use crate::collide::SecondPoint;
 use crate::dof::{Frame, Twist};
 use crate::settings::ContactSettings;
 
@@ -142,6 +143,35 @@ impl ContactTerm {
             is_impact: overlap > settings.transition || (closes && point.normal_force == 0.0),
             owed,
             start_speed: approach.now,
+        }
+    }
+
+    /// A point of the second look. What the tick itself has made of the gap is taken back at any speed.
+    pub fn second(
+        frames: [FrameIndex; 2],
+        SecondPoint { contact: point, start_gap, .. }: &SecondPoint,
+        arms: [DVec3; 2],
+        mass: f64,
+        settings: &ContactSettings,
+        dt: f64,
+    ) -> Self {
+        let unit = mass / (dt * dt);
+        let stiffness = settings.normal_stiffness.max((-point.gap / settings.transition).min(STIFFEST));
+        Self {
+            frames,
+            arms,
+            normal: point.normal,
+            start_gap: *start_gap,
+            excess_depth: 0.0,
+            normal_stiffness: stiffness * unit,
+            tangent_stiffness: settings.tangent_stiffness * unit,
+            transition: settings.transition,
+            friction: point.surface.friction,
+            anchor: point.anchor,
+            limit: 0.0,
+            is_impact: true,
+            owed: 0.0,
+            start_speed: 0.0,
         }
     }
 

@@ -12,7 +12,7 @@ mod state;
 
 use slotmap::SlotMap;
 
-use crate::collide::{Bodies, Detector};
+use crate::collide::{Bodies, Candidates, Detector};
 use crate::dof::{Body, BodyId, Placed};
 use crate::error::SimError;
 use crate::integrate::{Integrator, Scene, StepReport};
@@ -23,6 +23,9 @@ use crate::state::State;
 
 pub use conserved::{Energy, Momentum};
 pub use state::SliceView;
+
+/// Most times that a tick looks again for contacts where the solver put the bodies.
+const SECOND_LOOKS: usize = 3;
 
 /// A running world.
 pub struct World {
@@ -96,9 +99,24 @@ impl World {
 
     /// Stage 4: integrates all DOF over one tick.
     pub fn integrate(&mut self) -> &StepReport {
+        self.detector.second.clear();
         let (integrator, mut scene) = self.scene();
-        let report = integrator.step(&mut scene);
-        self.report = report;
+        integrator.begin(&mut scene);
+        for _ in 0..SECOND_LOOKS {
+            let first = self.detector.second.len();
+            let (integrator, mut scene) = self.scene();
+            integrator.tell_beliefs(&mut scene);
+            integrator.find_candidates(&scene);
+            let bodies = Bodies { bodies: &self.bodies, state: &self.state };
+            let candidates = Candidates { bodies, motions: self.integrator.candidates() };
+            if !self.detector.look_again(&candidates, &self.settings) {
+                break;
+            }
+            let (integrator, scene) = self.scene();
+            integrator.solve_on(&scene, first);
+        }
+        let (integrator, mut scene) = self.scene();
+        self.report = integrator.scatter(&mut scene);
         self.detector.remember();
         self.report.pairs = self.detector.pairs();
         self.settle();
@@ -114,6 +132,7 @@ impl World {
     pub fn rehearse(&mut self, solver: &SolverSettings) -> Result<StepReport, SimError> {
         let settings = Settings { solver: solver.clone(), ..self.settings.clone() };
         settings.validate()?;
+        self.detector.second.clear();
         let (integrator, scene) = self.scene();
         Ok(integrator.rehearse(&mut Scene { settings: &settings, ..scene }))
     }
@@ -128,6 +147,7 @@ impl World {
             placed: &self.placed,
             potentials: &mut self.potentials,
             contacts: &mut self.detector.contacts,
+            second: &mut self.detector.second,
         };
         (&mut self.integrator, scene)
     }

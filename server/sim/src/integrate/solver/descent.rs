@@ -323,7 +323,10 @@ impl<const D: usize> Descent<D> {
         let is_there = report.stopped_because == StoppedBecause::Tolerance || *u == self.u;
         if !is_there && merit.is_finite() {
             problem.move_to(u);
+            problem.remember_solution(u);
             (report.merit, report.residual) = (*merit, *residual);
+        } else {
+            problem.remember_solution(&self.u);
         }
     }
 }

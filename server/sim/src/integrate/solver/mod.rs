@@ -27,6 +27,7 @@ pub(super) mod work;
 use self::descent::Descent;
 use self::method::Method;
 use self::work::Work;
+use super::StepReport;
 use super::block::Entry;
 use super::line_search::Walk;
 use super::matrix::Matrix;
@@ -126,6 +127,24 @@ pub(crate) struct SolveReport {
     /// whose bottom the solution is.
     pub merit: f64,
     pub stopped_because: StoppedBecause,
+}
+
+impl SolveReport {
+    /// Counts in what another solve took.
+    pub fn add_effort(&mut self, other: &Self) {
+        self.iterations += other.iterations;
+        self.linear_iterations += other.linear_iterations;
+        self.evaluations += other.evaluations;
+        self.work += other.work;
+    }
+
+    /// Counts what it took in.
+    pub fn add_to(&self, report: &mut StepReport) {
+        report.iterations += self.iterations;
+        report.linear_iterations += self.linear_iterations;
+        report.evaluations += self.evaluations;
+        report.work += self.work;
+    }
 }
 
 /// All methods with their memory; those that are not in use are empty. D is 3 where no body of the island rotates, else 6.

@@ -1,0 +1,107 @@
+//! Solving on after the second look: islands are found anew with its points. What they touch is gathered again and goes on
+//! from where it was, what they do not touch is taken over as it is.
+
+use super::gather::{Spot, contact_spots};
+use super::solver::SolveReport;
+use super::step::{Integrator, Scene, Solve};
+use crate::dof::{Pose, Twist};
+
+/// Memory of solving on.
+#[derive(Default)]
+pub(super) struct Onward {
+    /// Where the solver wants to put bodies, by their index in the tick.
+    motions: Vec<Option<(Pose, Twist)>>,
+    /// Whether new points act on a body, by its index in the tick.
+    touched: Vec<bool>,
+    /// Island of each body before.
+    islands: Vec<u32>,
+    /// The solves before.
+    solves: Vec<Solve>,
+    /// What solves took that are no more.
+    pub spent: SolveReport,
+}
+
+impl Integrator {
+    /// Where the solver wants to put particles and rigid bodies, by their index in the tick.
+    pub fn find_candidates(&mut self, scene: &Scene) {
+        let Self { onward, active, islands, solves, .. } = self;
+        onward.motions.clear();
+        onward.motions.extend((0..).zip(active.iter()).map(|(index, active)| {
+            let body = &scene.bodies[active.id];
+            if body.figure.is_some() {
+                return None;
+            }
+            if let Some(solve) = solves.get(islands.island_of(index) as usize) {
+                let frame = &solve.problem.frames[active.start as usize];
+                return Some((frame.pose(), frame.twist()));
+            }
+            let node = body.node(scene.state, scene.settings.dt, scene.settings.field());
+            Some((node.pose(node.target, scene.settings.dt), node.target))
+        }));
+    }
+
+    /// What [`Integrator::find_candidates`] found.
+    pub fn candidates(&self) -> &[Option<(Pose, Twist)>] {
+        &self.onward.motions
+    }
+
+    /// Tells all contact points how wide their linear models believe them to be at the candidate.
+    pub fn tell_beliefs(&self, scene: &mut Scene) {
+        for solve in &self.solves[..self.islands.len()] {
+            let problem = &solve.problem;
+            let mut gaps = problem.terms.contacts.iter().map(|term| -term.final_depth(problem.dt, problem.pair(term)));
+            for (&source, gap) in solve.contacts.iter().zip(&mut gaps) {
+                scene.contacts[source as usize].believed_gap = gap;
+            }
+            for (&source, gap) in solve.second.iter().zip(&mut gaps) {
+                scene.second[source as usize].contact.believed_gap = gap;
+            }
+        }
+    }
+
+    /// Solves on with the points of the second look from number `first` on.
+    pub fn solve_on(&mut self, scene: &Scene, first: usize) {
+        let Self { onward, active, islands, solves, .. } = self;
+        onward.touched.clear();
+        onward.touched.resize(active.len(), false);
+        for point in &scene.second[first..] {
+            for index in contact_spots(scene, &point.contact).into_iter().flatten().filter_map(Spot::body) {
+                onward.touched[index as usize] = true;
+            }
+        }
+        onward.islands.clear();
+        onward.islands.extend((0..active.len() as u32).map(|index| islands.island_of(index)));
+        std::mem::swap(&mut onward.solves, solves);
+        self.find_islands(scene);
+        let mut onward = std::mem::take(&mut self.onward);
+        for island in 0..self.islands.len() {
+            self.go_on(island, &mut onward, scene);
+        }
+        self.onward = onward;
+        self.gather_potentials(scene);
+        self.solve(scene.settings);
+    }
+
+    /// Takes an island over, or gathers its bodies again.
+    fn go_on(&mut self, island: usize, onward: &mut Onward, scene: &Scene) {
+        let Self { active, islands, solves, .. } = self;
+        let (members, solve) = (islands.members(island), &mut solves[island]);
+        if !members.iter().any(|&member| onward.touched[member as usize]) {
+            let before = onward.islands[members[0] as usize];
+            std::mem::swap(solve, &mut onward.solves[before as usize]);
+            solve.is_gathering = false;
+            return;
+        }
+        solve.clear(scene.settings);
+        for &member in members {
+            let active = &mut active[member as usize];
+            let (start, known) = (active.start as usize, solve.problem.len());
+            solve.take_in(active, scene);
+            let before = onward.solves.get_mut(onward.islands[member as usize] as usize);
+            solve.problem.start_from(known, before.as_ref().map(|before| before.problem.solution(start)));
+            if let Some(before) = before {
+                onward.spent.add_effort(&std::mem::take(&mut before.report));
+            }
+        }
+    }
+}
