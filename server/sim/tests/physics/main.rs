@@ -18,6 +18,7 @@ mod own_kind;
 mod potentials;
 mod queries;
 mod restitution;
+mod second_look;
 mod sheep;
 mod sheep_forms;
 mod sleep;

@@ -114,8 +114,8 @@ impl<const D: usize> Descent<D> {
         budget: Option<u64>,
     ) -> SolveReport {
         let mut work = Work::begin::<D>(problem, budget);
-        let mut report = SolveReport::default();
-        report.merit = guess(problem, settings, &mut work, &mut self.u, &mut self.start, &mut self.residual);
+        let merit = guess(problem, settings, &mut work, &mut self.u, &mut self.start, &mut self.residual);
+        let mut report = SolveReport { merit, ..SolveReport::default() };
         self.best.forget();
         self.watchdog.begin(method.walk() == Walk::NEWTON && problem.bends());
         (self.friction_from, self.friction_failures) = (FRICTION_FROM, 0);
