@@ -70,8 +70,11 @@ pub struct ContactSettings {
     pub tangent_stiffness: f64,
     /// Depth over which the normal force's cubic grows into a line, m.
     pub transition: f64,
-    /// Fastest recovery of what is too deep, m/s.
+    /// Fastest recovery of what is too deep, m/s. It moves positions and leaves no speed behind; 0 leaves depths as they are.
+    /// Islands in which something recovers are solved a second time, within as much of the budget again.
     pub recovery_speed: f64,
+    /// Depth that a steady load may bring about, whatever the masses, m: contacts stiffen with their load until it holds.
+    pub gap_tolerance: f64,
     /// What closes faster is a collision and bounces by its restitution; what is slower rests, m/s. Below what gravity adds
     /// in a tick, 0.33 m/s at 30 Hz, what rests would go on bouncing.
     pub collision_speed: f64,
@@ -115,9 +118,10 @@ impl Settings {
         stiff(solver.joint_stiffness, "solver.joint_stiffness")?;
         stiff(contact.normal_stiffness, "contact.normal_stiffness")?;
         stiff(contact.tangent_stiffness, "contact.tangent_stiffness")?;
-        let ContactSettings { transition, recovery_speed, collision_speed, margin, .. } = *contact;
+        let ContactSettings { transition, recovery_speed, gap_tolerance, collision_speed, margin, .. } = *contact;
         require((1e-9..=1.0).contains(&transition), "contact.transition", transition, "1e-9 to 1 m")?;
         require((0.0..=1e3).contains(&recovery_speed), "contact.recovery_speed", recovery_speed, "0 to 1000 m/s")?;
+        require((1e-6..=1.0).contains(&gap_tolerance), "contact.gap_tolerance", gap_tolerance, "1e-6 to 1 m")?;
         require((0.0..=1e3).contains(&collision_speed), "contact.collision_speed", collision_speed, "0 to 1000 m/s")?;
         require((0.0..=10.0).contains(&margin), "contact.margin", margin, "0 to 10 m")?;
         let Some(SleepSettings { linear_speed, angular_speed, time }) = self.sleep else { return Ok(()) };
@@ -163,6 +167,7 @@ impl Default for ContactSettings {
             tangent_stiffness: 100.0,
             transition: 1e-3,
             recovery_speed: 3.0,
+            gap_tolerance: 1e-3,
             collision_speed: 0.5,
             margin: 0.01,
         }

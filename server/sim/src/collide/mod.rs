@@ -125,6 +125,10 @@ pub(crate) struct ContactPoint {
     pub anchor: DVec3,
     /// At the end of the last tick that had this point, N.
     pub normal_force: f64,
+    /// How much stiffer than the settings' the last tick found that it must be for its load; 0 where nothing is known.
+    pub stiffening: f64,
+    /// Turn of `b` against `a` that rolling and spinning resistance remember, rad.
+    pub turn: DVec3,
     /// That the two gave each other in the last tick.
     pub blow: Blow,
     /// Where the solver put its bodies, as its linear model has it, m.
@@ -143,9 +147,30 @@ impl ContactPoint {
     /// A point of a pair that has no history.
     fn fresh((a, b): Key, normal: DVec3, point: &ManifoldPoint, surface: Surface) -> Self {
         let ManifoldPoint { position, gap, feature } = *point;
-        let (anchor, normal_force, blow, believed_gap) = (DVec3::ZERO, 0.0, Blow::default(), gap);
-        let is_cancelled = false;
-        Self { a, b, position, normal, gap, surface, anchor, normal_force, blow, believed_gap, is_cancelled, feature }
+        let (anchor, turn, blow, believed_gap) = (DVec3::ZERO, DVec3::ZERO, Blow::default(), gap);
+        let (normal_force, stiffening, is_cancelled) = (0.0, 0.0, false);
+        Self {
+            a,
+            b,
+            position,
+            normal,
+            gap,
+            surface,
+            anchor,
+            normal_force,
+            stiffening,
+            turn,
+            blow,
+            believed_gap,
+            is_cancelled,
+            feature,
+        }
+    }
+
+    /// Takes over what `old`, the same point in the last tick, remembers; stiffening is the pair's.
+    fn inherit(&mut self, old: &Self) {
+        self.anchor = old.anchor - self.normal * self.normal.dot(old.anchor);
+        (self.normal_force, self.turn, self.blow) = (old.normal_force, old.turn, old.blow);
     }
 
     /// A new point without a history between bodies that do not matter.
@@ -247,7 +272,7 @@ impl Detector {
         let start = self.contacts.partition_point(|contact| of_pair(contact) < touch.key);
         for contact in self.contacts[start..].iter_mut().take_while(|contact| of_pair(contact) == touch.key) {
             let (anchor, normal_force, blow) = (DVec3::ZERO, 0.0, Blow::default());
-            *contact = ContactPoint { is_cancelled: true, anchor, normal_force, blow, ..*contact };
+            *contact = ContactPoint { is_cancelled: true, anchor, normal_force, turn: anchor, blow, ..*contact };
         }
         true
     }

@@ -18,7 +18,6 @@ use super::shape::{Collider, Shape};
 use super::triangle_mesh::TriangleMesh;
 use super::{ContactPoint, Moving, Partner, Surface};
 use crate::dof::Pose;
-use crate::potential::restitution::Blow;
 use crate::settings::Settings;
 
 /// A point without a name of its own is found again where it lies within this of its place last tick, m.
@@ -359,18 +358,20 @@ fn remember_points(
 ) {
     let single = manifold.reduced().len() == 1 && old.len() == 1;
     let normal = manifold.normal;
+    // Points of a pair share it: each by itself would stiffen for the load that its stiffness draws to it.
+    let stiffening = old.iter().map(|point| point.stiffening).fold(0.0, f64::max);
     for point in manifold.reduced() {
         let known = old.iter().position(|o| {
             let named = o.feature == point.feature && point.feature != NAMELESS;
             let near = (o.position - point.position).length() < SAME_POINT;
             single || named || (near && (o.feature == NAMELESS || point.feature == NAMELESS))
         });
-        let (anchor, normal_force, blow) = known.map_or((DVec3::ZERO, 0.0, Blow::default()), |i| {
-            let memory = old.swap_remove(i);
-            (memory.anchor - normal * normal.dot(memory.anchor), memory.normal_force, memory.blow)
-        });
-        let fresh = ContactPoint::fresh(key, normal, point, surface);
-        points.push(ContactPoint { anchor, normal_force, blow, ..fresh });
+        let mut point = ContactPoint::fresh(key, normal, point, surface);
+        point.stiffening = stiffening;
+        if let Some(known) = known {
+            point.inherit(&old.swap_remove(known));
+        }
+        points.push(point);
     }
 }
 

@@ -290,6 +290,27 @@ impl Body {
         }
     }
 
+    /// Writes the twist `u` at the end of a tick, for a particle or rigid body that has been moved already.
+    pub fn keep_twist(&mut self, node: &Node, u: Twist, state: &mut State) {
+        let angular = match self.kind {
+            DofKind::Particle => DVec3::ZERO,
+            _ => rigid_body::spin_after(self, node, u, self.pose(state).rotation),
+        };
+        self.set_twist(Twist { linear: u.linear, angular }, state);
+        self.remember_impulse(node, u);
+    }
+
+    /// Remembers what potentials did to the twist of a tick that ended with `u`.
+    pub fn remember_impulse(&mut self, node: &Node, u: Twist) {
+        let Twist { linear, angular } = node.target;
+        self.impulse = Twist { linear: u.linear - linear, angular: u.angular - angular };
+    }
+
+    /// Writes the rates of a figure at the end of a tick, that has been moved already.
+    pub fn set_figure_rates(&self, v1: &[f64], state: &mut State) {
+        state.v_mut(self.slice).copy_from_slice(v1);
+    }
+
     /// Writes the state of a figure at the end of a tick.
     pub fn advance_figure(&mut self, q1: &[f64], v1: &[f64], state: &mut State) {
         let Some(figure) = &mut self.figure else { return };

@@ -60,15 +60,19 @@ pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: Gravity)
 
 pub(super) fn advance(body: &Body, node: &Node, u: Twist, dt: f64, state: &mut State) {
     let Pose { position, rotation } = node.pose(u, dt);
-    // Momentum at the end of the tick: what the body had, plus what the torques gave.
-    let momentum = node.inertia * u.angular;
-    let angular = world_inertia(rotation, body.inertia.recip()) * momentum;
+    let angular = spin_after(body, node, u, rotation);
     let q = state.q_mut(body.slice);
     q[..3].copy_from_slice(&position.to_array());
     q[3..].copy_from_slice(&rotation.to_array());
     let v = state.v_mut(body.slice);
     v[..3].copy_from_slice(&u.linear.to_array());
     v[3..].copy_from_slice(&angular.to_array());
+}
+
+/// Angular velocity at the end of a tick with twist `u` that ends with `rotation`: of the momentum that the body had, plus
+/// what the torques gave.
+pub(super) fn spin_after(body: &Body, node: &Node, u: Twist, rotation: DQuat) -> DVec3 {
+    world_inertia(rotation, body.inertia.recip()) * (node.inertia * u.angular)
 }
 
 /// R diag(principal) Rᵀ.

@@ -6,7 +6,7 @@ use super::attachment::trace;
 use super::problem::{Rates, Unknown};
 use super::step::{Integrator, Scene, Solve};
 use super::wheels;
-use crate::collide::{ContactPoint, Partner};
+use crate::collide::{ContactPoint, Partner, Surface};
 use crate::dof::{ABSENT, BLOCK_RATES_MAX, BodyId, FigureBody, Frame, Inertia, Node, PartPoint, Placed, Twist};
 use crate::island::Islands;
 use crate::potential::axle::AxleTerm;
@@ -15,6 +15,7 @@ use crate::potential::contact::{Approach, ContactTerm};
 use crate::potential::hold::{Held, STRONGEST, Scale};
 use crate::potential::pd::PdTerm;
 use crate::potential::rod::RodTerm;
+use crate::potential::rolling::RollingTerm;
 use crate::potential::spring::SpringTerm;
 use crate::potential::{Anchor, End, FIXED};
 use crate::settings::Settings;
@@ -202,7 +203,7 @@ impl Integrator {
             let (frames, mass) = (ends.map(|end| end.frame), solve.reduced_mass(ends));
             let (origins, turns) = (ends.map(|end| solve.origin(end)), ends.map(|end| solve.turns(end)));
             let (now, free) = (ends.map(|end| solve.start_twist(end)), ends.map(|end| solve.free_twist(end)));
-            for contact in points {
+            for (index, contact) in (0..).zip(points) {
                 let arm = |i: usize| if turns[i] { contact.position - origins[i] } else { DVec3::ZERO };
                 let arms = [arm(0), arm(1)];
                 let closing = |of: [Twist; 2]| contact.normal.dot(of[0].at(arms[0]) - of[1].at(arms[1]));
@@ -211,6 +212,15 @@ impl Integrator {
                 let at_point = if bounces { (mobility(0) + mobility(1)).recip() } else { mass };
                 let approach = Approach { now: closing(now), free: closing(free), mass: at_point };
                 let term = ContactTerm::new(frames, contact, arms, mass, approach, settings, *dt);
+                let Surface { rolling_resistance, spinning_resistance, .. } = contact.surface;
+                if rolling_resistance.max(spinning_resistance) > 0.0 {
+                    let scale = solve.turn_scale(ends, settings.tangent_stiffness);
+                    if scale.unit > 0.0 {
+                        let rolling = RollingTerm::new(term.clone(), contact, scale.unit * scale.least);
+                        solve.problem.terms.rolling.push(rolling);
+                        solve.rolling.push(solve.contacts.len() as u32 + index);
+                    }
+                }
                 solve.problem.terms.contacts.push(term);
             }
             solve.contacts.extend(sources);

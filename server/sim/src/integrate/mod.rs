@@ -18,6 +18,7 @@ mod matrix;
 mod preconditioner;
 pub(crate) mod problem;
 mod pull_back;
+mod recovery;
 mod second_look;
 mod solver;
 mod step;

@@ -16,6 +16,7 @@ use crate::potential::limit::AngleLimitTerm;
 use crate::potential::motor::MotorTerm;
 use crate::potential::pd::PdTerm;
 use crate::potential::rod::RodTerm;
+use crate::potential::rolling::RollingTerm;
 use crate::potential::slider::SliderTerm;
 use crate::potential::spring::SpringTerm;
 use crate::potential::universal_joint::UniversalJointTerm;
@@ -48,6 +49,7 @@ macro_rules! terms {
 
 terms! {
     contacts: ContactTerm,
+    rolling: RollingTerm,
     springs: SpringTerm,
     rods: RodTerm,
     own_rods: RodTerm,
@@ -369,7 +371,7 @@ impl Problem {
     /// Raises the stiffness of joints that are open although the candidate is nearly the solution. Answers whether there
     /// was one: the solution is then another.
     pub(super) fn stiffen(&mut self) -> bool {
-        let mut visitor = Stiffen { frames: &self.frames, any: false };
+        let mut visitor = Stiffen { dt: self.dt, frames: &self.frames, any: false };
         self.terms.visit(&mut visitor);
         visitor.any
     }
@@ -497,6 +499,7 @@ impl Visitor for Bends {
 }
 
 struct Stiffen<'a> {
+    dt: f64,
     frames: &'a [Frame<f64>],
     any: bool,
 }
@@ -504,7 +507,7 @@ struct Stiffen<'a> {
 impl Visitor for Stiffen<'_> {
     fn visit<T: Term>(&mut self, terms: &mut [T]) {
         for term in terms {
-            self.any |= term.stiffen(pair(self.frames, term));
+            self.any |= term.stiffen(self.dt, pair(self.frames, term));
         }
     }
 }

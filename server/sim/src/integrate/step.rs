@@ -13,7 +13,7 @@ use super::problem::{Problem, Unknown};
 use super::second_look::Onward;
 use super::solver::{SolveReport, Solvers, StoppedBecause};
 use crate::collide::{ContactPoint, SecondPoint};
-use crate::dof::{Body, BodyId, Placed, Twist};
+use crate::dof::{Body, BodyId, Placed};
 use crate::island::Islands;
 use crate::potential::hold::{Joint, Memory};
 use crate::potential::{
@@ -42,7 +42,7 @@ pub(crate) struct Scene<'a> {
 
 /// The solvers' memory. Nothing in it lasts longer than a solve, so islands share it: it stays in the cache.
 #[derive(Default)]
-struct Workspace {
+pub(super) struct Workspace {
     rigid: Solvers<6>,
     particles: Solvers<3>,
 }
@@ -63,6 +63,8 @@ pub(super) struct Solve {
     pub contacts: Vec<u32>,
     /// Index of each contact term after those among the points of the second look.
     pub second: Vec<u32>,
+    /// Index of the contact term of each rolling resistance.
+    pub rolling: Vec<u32>,
     pub rods: Vec<RodId>,
     /// Body and index of each rod of a figure.
     pub own_rods: Vec<(BodyId, u32)>,
@@ -85,7 +87,7 @@ pub(crate) struct Integrator {
     pub(super) onward: Onward,
     pool: Option<rayon::ThreadPool>,
     /// One for the calling thread and for each of the pool.
-    workspace: Workspace,
+    pub(super) workspace: Workspace,
     pool_workspaces: Vec<Mutex<Workspace>>,
 }
 
@@ -204,8 +206,7 @@ fn land(
                 }
             };
             body.advance(node, twist, settings.dt, state);
-            let linear = twist.linear - node.target.linear;
-            body.impulse = Twist { linear, angular: twist.angular - node.target.angular };
+            body.remember_impulse(node, twist);
             report.dof += if node.rotates { 6 } else { 3 };
             if !body.is_sane(state) {
                 body.quarantine(state, |q| node.start.write(q));
@@ -227,7 +228,7 @@ fn land(
 }
 
 impl Workspace {
-    fn solve(&mut self, solve: &mut Solve, settings: &SolverSettings) {
+    pub fn solve(&mut self, solve: &mut Solve, settings: &SolverSettings) {
         let Solve { problem, budget, report, is_pending, .. } = solve;
         if !std::mem::take(is_pending) {
             return;
@@ -249,6 +250,7 @@ impl Solve {
         self.report = SolveReport::default();
         self.contacts.clear();
         self.second.clear();
+        self.rolling.clear();
         self.rods.clear();
         self.own_rods.clear();
         self.ball_joints.clear();
@@ -267,10 +269,15 @@ impl Solve {
             let (contact, at) = (&mut scene.contacts[source as usize], problem.pair(term));
             contact.anchor = finite_or_zero(term.final_anchor(dt, at));
             contact.blow = term.final_blow(dt, at);
+            contact.stiffening = finite_or_zero(DVec3::X * term.final_stiffening(dt, at)).x;
             contact.normal_force = finite_or_zero(DVec3::X * term.normal_force(dt, at)).x;
         }
         let depths = problem.terms.contacts.iter().map(|term| term.final_depth(dt, problem.pair(term)));
         report.worst_penetration = depths.fold(report.worst_penetration, f64::max);
+        for (term, &contact) in problem.terms.rolling.iter().zip(&self.rolling) {
+            let source = self.contacts[contact as usize];
+            scene.contacts[source as usize].turn = finite_or_zero(term.final_anchor(dt, problem.pair(term)));
+        }
         let potentials = &mut *scene.potentials;
         for (term, &id) in problem.terms.rods.iter().zip(&self.rods) {
             potentials.rods[id].memory = account(problem, term, report);
@@ -338,6 +345,6 @@ fn account(problem: &Problem, joint: &impl Joint, report: &mut StepReport) -> Me
 }
 
 /// What a potential remembers must not carry a non-finite number into the next tick.
-fn finite_or_zero(v: DVec3) -> DVec3 {
+pub(super) fn finite_or_zero(v: DVec3) -> DVec3 {
     if v.is_finite() { v } else { DVec3::ZERO }
 }

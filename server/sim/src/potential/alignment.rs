@@ -167,9 +167,9 @@ impl<Place: Joint, T: Turns> Term for Aligned<Place, T> {
         self.place.propose(step);
     }
 
-    fn stiffen(&mut self, at: [&Frame<f64>; 2]) -> bool {
+    fn stiffen(&mut self, dt: f64, at: [&Frame<f64>; 2]) -> bool {
         let tilt = self.tilt(at);
         // Both, whatever the first answers.
-        self.place.stiffen(at) | self.turns.hold_mut().stiffen(tilt)
+        self.place.stiffen(dt, at) | self.turns.hold_mut().stiffen(tilt)
     }
 }

@@ -104,7 +104,7 @@ impl Term for BallJointTerm {
         self.force = (self.gap + moved) * self.hold.stiffness;
     }
 
-    fn stiffen(&mut self, at: [&Frame<f64>; 2]) -> bool {
+    fn stiffen(&mut self, _dt: f64, at: [&Frame<f64>; 2]) -> bool {
         let gap = self.gap(at);
         self.hold.stiffen(gap)
     }

@@ -15,10 +15,34 @@ use crate::dof::{Frame, Twist};
 use crate::settings::ContactSettings;
 
 /// Slip at which friction is saturated, in units of limit / stiffness: where x − 4/27 x³ peaks.
-const SATURATION: f64 = 1.5;
+pub(super) const SATURATION: f64 = 1.5;
 
 /// Most that an impact stiffens a contact, in reduced masses per dt²: 1000 m/s at 30 Hz.
 const STIFFEST: f64 = 4e4;
+
+/// What the depth at the start of a tick exceeds that under its load by before recovery is taken out of the velocity, m:
+/// at 30 Hz 3 mm leave a hop of 0.4 mm.
+const RECOVERY_SLOP: f64 = 3e-3;
+
+/// Stiffest that a load makes a contact, in reduced masses per dt²: what bears 200,000 times its own mass.
+const STIFFEST_LOADED: f64 = 1e6;
+
+/// Share of the gap tolerance that a steady load takes up: what is left is for changes of the load.
+const SHARE: f64 = 0.5;
+
+/// Tolerances by which a contact must be too deep to be stiffened within the tick. What is less follows in the next ones:
+/// impacts are over by then.
+const FAR_TOO_DEEP: f64 = 4.0;
+
+/// Least and most that a stiffness grows by from tick to tick, and shares of the depth that is wanted within which it
+/// stays, so that what rests stays where it is.
+const FOLLOW: (f64, f64) = (0.7, 2.0);
+const STEADY: (f64, f64) = (0.6, 2.0);
+
+/// A load is steady where the contact closes or opens at less than this at the start of the tick, m/s, and where it
+/// changed by less than this share since the last. To follow impacts cost a slammed jelly its solution.
+const RESTING_SPEED: f64 = 0.1;
+const CHANGE: f64 = 0.3;
 
 /// How much stiffer than an impact a contact is that parts its bodies: what it gives way is missing from the bounce, with
 /// this 0.1 % of its speed at 4 m/s.
@@ -26,7 +50,7 @@ const BOUNCE_STIFFENING: f64 = 30.0;
 
 /// Share of the tangent in friction's stiffness along the slip, the rest is secant. Newton iterations a tick at 0.5, 0.8
 /// and 1: slope55 2.8, 1.9, 1.1; 16 cars 56, 54, 51; pile100 10.2, 7.1, 7.4; 100 sheep 261, 257, 268.
-const TANGENT_SHARE: f64 = 0.8;
+pub(super) const TANGENT_SHARE: f64 = 0.8;
 
 /// How fast a contact point closes, m/s.
 #[derive(Clone, Copy, Debug, Default)]
@@ -51,6 +75,14 @@ pub(crate) struct ContactTerm {
     start_gap: f64,
     /// What the start was deeper than that, m.
     excess_depth: f64,
+    /// Start gap of a tick without recovery: as deep as the load explains, m.
+    loaded_gap: f64,
+    /// How much stiffer than the settings' it is for its load.
+    stiffening: f64,
+    /// Most that this may become.
+    most_stiffening: f64,
+    /// Depth that it may have under its load, m.
+    tolerance: f64,
     /// N/m.
     normal_stiffness: f64,
     /// N/m.
@@ -68,6 +100,8 @@ pub(crate) struct ContactTerm {
     owed: f64,
     /// Speed at which it closed at the start of the tick, m/s.
     start_speed: f64,
+    /// Normal force at the end of the last tick, N.
+    last_force: f64,
 }
 
 /// Normal force over stiffness and its integral at depth s: k (s²/w − s³/3w²) up to w, then a line.
@@ -84,6 +118,17 @@ fn normal_spline<S: Scalar>(s: S, w: f64) -> (S, S) {
     }
 }
 
+/// Depth at which the spline's force is `f`, m.
+fn depth_under(f: f64, w: f64) -> f64 {
+    let f = f / w;
+    if f >= 2.0 / 3.0 {
+        return (f + 1.0 / 3.0) * w;
+    }
+    // Newton from above: the spline is convex there.
+    let step = |x: f64| x - (x * x * (1.0 - x / 3.0) - f) / (x * (2.0 - x)).max(f64::MIN_POSITIVE);
+    (0..4).fold((1.5 * f).sqrt(), |x, _| step(x)) * w
+}
+
 /// Derivative of the spline's force.
 fn normal_slope(s: f64, w: f64) -> f64 {
     let x = (s / w).clamp(0.0, 1.0);
@@ -92,7 +137,7 @@ fn normal_slope(s: f64, w: f64) -> f64 {
 
 /// Friction over its limit and its integral at slip x: x − 4/27 x³ up to 1.5, then 1.
 #[inline]
-fn friction_patch<S: Scalar>(x: S) -> (S, S) {
+pub(super) fn friction_patch<S: Scalar>(x: S) -> (S, S) {
     if x.below(SATURATION) {
         let x2 = x * x;
         (x2 * (-x2 / 27.0 + 0.5), x * (-x2 * (4.0 / 27.0) + 1.0))
@@ -102,7 +147,7 @@ fn friction_patch<S: Scalar>(x: S) -> (S, S) {
 }
 
 /// Derivative of the patch's force.
-fn friction_slope(x: f64) -> f64 {
+pub(super) fn friction_slope(x: f64) -> f64 {
     if x < SATURATION { 1.0 - 4.0 / 9.0 * x * x } else { 0.0 }
 }
 
@@ -125,17 +170,26 @@ impl ContactTerm {
             None => approach.now * dt - point.gap.max(0.0),
         };
         let closes = point.gap - approach.free * dt < settings.transition;
-        let stiffness = settings.normal_stiffness.max((overlap / settings.transition).min(STIFFEST));
-        let start_gap = point.gap.max(-settings.recovery_speed * dt);
-        let start_gap = parting_speed.map_or(start_gap, |speed| -speed * dt);
+        let most_stiffening = (STIFFEST_LOADED / settings.normal_stiffness).max(1.0);
+        let stiffening = point.stiffening.clamp(1.0, most_stiffening);
+        let loaded = settings.normal_stiffness * stiffening;
+        let stiffness = loaded.max((overlap / settings.transition).min(STIFFEST));
+        let load_depth = depth_under(point.normal_force / (loaded * unit), settings.transition);
+        let loaded_gap = point.gap.max(-load_depth);
+        let start_gap = point.gap.max(-load_depth - settings.recovery_speed * dt);
+        let (start_gap, loaded_gap) = parting_speed.map_or((start_gap, loaded_gap), |speed| (-speed * dt, -speed * dt));
         Self {
             frames,
             arms,
             normal: point.normal,
             start_gap,
             excess_depth: start_gap - point.gap,
+            loaded_gap,
+            stiffening,
+            most_stiffening,
+            tolerance: settings.gap_tolerance,
             normal_stiffness: stiffness * unit,
-            tangent_stiffness: settings.tangent_stiffness * unit,
+            tangent_stiffness: settings.tangent_stiffness * stiffening * unit,
             transition: settings.transition,
             friction: point.surface.friction,
             anchor: point.anchor,
@@ -143,6 +197,7 @@ impl ContactTerm {
             is_impact: overlap > settings.transition || (closes && point.normal_force == 0.0),
             owed,
             start_speed: approach.now,
+            last_force: point.normal_force,
         }
     }
 
@@ -163,6 +218,10 @@ impl ContactTerm {
             normal: point.normal,
             start_gap: *start_gap,
             excess_depth: 0.0,
+            loaded_gap: *start_gap,
+            stiffening: 1.0,
+            most_stiffening: 1.0,
+            tolerance: settings.gap_tolerance,
             normal_stiffness: stiffness * unit,
             tangent_stiffness: settings.tangent_stiffness * unit,
             transition: settings.transition,
@@ -172,6 +231,7 @@ impl ContactTerm {
             is_impact: true,
             owed: 0.0,
             start_speed: 0.0,
+            last_force: 0.0,
         }
     }
 
@@ -216,6 +276,31 @@ impl ContactTerm {
     /// Depth at the candidate state, m; negative where it is open.
     pub fn final_depth(&self, dt: f64, at: [&Frame<f64>; 2]) -> f64 {
         self.depth(self.displacement(dt, at)) + self.excess_depth
+    }
+
+    /// Whether it takes back a depth that its load does not explain.
+    pub fn recovers(&self) -> bool {
+        self.loaded_gap - self.start_gap > RECOVERY_SLOP
+    }
+
+    /// From now on it is that of a tick in which its bodies are as deep as the load explains.
+    pub fn stop_recovery(&mut self) {
+        self.excess_depth += self.loaded_gap - self.start_gap;
+        self.start_gap = self.loaded_gap;
+    }
+
+    /// How much stiffer than the settings' it is to be in the next tick, so that the load takes up its share of the
+    /// tolerance.
+    pub fn final_stiffening(&self, dt: f64, at: [&Frame<f64>; 2]) -> f64 {
+        let ratio = self.depth(self.displacement(dt, at)) / (SHARE * self.tolerance);
+        let force = self.normal_force(dt, at);
+        let is_steady = self.start_speed.abs() < RESTING_SPEED && (force - self.last_force).abs() < CHANGE * force;
+        let next = match ratio {
+            _ if !is_steady => ratio.clamp(FOLLOW.0, 1.0),
+            _ if (STEADY.0..STEADY.1).contains(&ratio) => 1.0,
+            _ => ratio.clamp(FOLLOW.0, FOLLOW.1),
+        };
+        (self.stiffening * next).clamp(1.0, self.most_stiffening)
     }
 
     /// The blow that the bodies gave each other in this tick, for the next.
@@ -326,6 +411,19 @@ impl Term for ContactTerm {
     #[inline]
     fn relinearise(&mut self, dt: f64, at: [&Frame<f64>; 2]) {
         self.limit = self.friction * self.normal_force(dt, at);
+    }
+
+    fn stiffen(&mut self, dt: f64, at: [&Frame<f64>; 2]) -> bool {
+        let depth = self.depth(self.displacement(dt, at));
+        let grows = depth > FAR_TOO_DEEP * self.tolerance && self.stiffening < self.most_stiffening;
+        if grows {
+            let wanted = self.stiffening * depth / (SHARE * self.tolerance);
+            let growth = wanted.min(self.most_stiffening) / self.stiffening;
+            self.stiffening *= growth;
+            self.normal_stiffness *= growth;
+            self.tangent_stiffness *= growth;
+        }
+        grows
     }
 }
 

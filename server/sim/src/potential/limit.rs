@@ -194,7 +194,7 @@ impl Term for AngleLimitTerm {
         blocks
     }
 
-    fn stiffen(&mut self, at: [&Frame<f64>; 2]) -> bool {
+    fn stiffen(&mut self, _dt: f64, at: [&Frame<f64>; 2]) -> bool {
         let tilt = self.tilt(at);
         self.hold.stiffen(tilt)
     }

@@ -19,6 +19,7 @@ pub(crate) mod pd;
 mod pool;
 pub(crate) mod restitution;
 pub(crate) mod rod;
+pub(crate) mod rolling;
 pub(crate) mod slider;
 pub(crate) mod spring;
 #[cfg(test)]
@@ -265,7 +266,7 @@ pub(crate) trait Term {
 
     /// Raises a stiffness that the engine chose, where the candidate, which is nearly the solution, leaves a gap above
     /// its tolerance. Answers whether it did.
-    fn stiffen(&mut self, _at: [&Frame<f64>; 2]) -> bool {
+    fn stiffen(&mut self, _dt: f64, _at: [&Frame<f64>; 2]) -> bool {
         false
     }
 }

@@ -128,7 +128,7 @@ impl Term for LineTerm {
         self.force = (self.off + self.across * moved) * self.hold.stiffness;
     }
 
-    fn stiffen(&mut self, at: [&Frame<f64>; 2]) -> bool {
+    fn stiffen(&mut self, _dt: f64, at: [&Frame<f64>; 2]) -> bool {
         let gap = self.gap(at);
         self.hold.stiffen(gap)
     }

@@ -12,6 +12,7 @@ use super::limit::AngleLimitTerm;
 use super::motor::MotorTerm;
 use super::pd::PdTerm;
 use super::rod::RodTerm;
+use super::rolling::RollingTerm;
 use super::slider::LineTerm;
 use super::spring::SpringTerm;
 use super::universal_joint::RightAngle;
@@ -180,6 +181,17 @@ fn contact(normal: DVec3, gap: f64, anchor: DVec3, arms: [DVec3; 2], normal_forc
 }
 
 proptest! {
+    #[test]
+    fn rolling_derives(n in vector(), turn in vector(), force in 1.0..500.0f64, t in frame(), u in frame()) {
+        prop_assume!(n.length() > 0.1);
+        let mut point = ContactPoint::at(DVec3::ZERO, n.normalize(), 0.0, 0.7);
+        (point.turn, point.normal_force) = (turn * 0.01, force);
+        (point.surface.rolling_resistance, point.surface.spinning_resistance) = (0.05, 0.2);
+        let contact = contact(point.normal, 0.0, DVec3::ZERO, [DVec3::ZERO; 2], force);
+        let term = RollingTerm::new(contact, &point, 400.0);
+        check_gradient(&term, &[t, u]);
+    }
+
     #[test]
     fn spring_derives(a in vector(), b in vector(), rest in 0.0..2.0, l0 in 0.1..2.0, t in frame(), u in frame()) {
         prop_assume!((t.place(a) - u.place(b)).length() > 0.1);

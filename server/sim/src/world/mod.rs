@@ -116,7 +116,9 @@ impl World {
             integrator.solve_on(&scene, first);
         }
         let (integrator, mut scene) = self.scene();
-        self.report = integrator.scatter(&mut scene);
+        let mut report = integrator.scatter(&mut scene);
+        integrator.forget_recovery(&mut scene, &mut report);
+        self.report = report;
         self.detector.remember();
         self.report.pairs = self.detector.pairs();
         self.settle();

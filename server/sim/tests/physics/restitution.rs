@@ -124,7 +124,9 @@ fn tumbling_shapes_do_not_gain_energy() {
             }
             // The speed at the end of a tick is half a tick ahead of the position: g dt v / 2 at 6 m/s.
             assert!(highest < start + 2.0 * 9.81 * DT * 3.2, "{shape:?} {restitution}: {highest} of {start}");
-            assert!(world.velocity(body).unwrap().length() < 1e-2, "{shape:?} {restitution} still moves");
+            // What spins without friction may go on spinning.
+            let end = world.energy().total();
+            assert!(end < 0.8 * start, "{shape:?} {restitution}: still {end} of {start}");
         }
     }
 }

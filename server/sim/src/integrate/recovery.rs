@@ -1,0 +1,60 @@
+//! Recovery moves positions only: what overlaps parts, and keeps nothing of the speed at which it does.
+//!
+//! A contact that starts out deep is solved twice. The first solution, with the depth taken back at a bounded speed, moves
+//! Q. The second is that of the same tick with the bodies just touching; it is what Q' and the contacts' forces become, so
+//! that momentum is that of a tick without recovery. Only islands with a deep contact pay for it.
+
+use super::StepReport;
+use super::step::{Integrator, Scene, Solve, finite_or_zero};
+use glam::DVec3;
+
+impl Integrator {
+    /// After Q and Q' have been written: takes out of Q' what recovery brought.
+    pub fn forget_recovery(&mut self, scene: &mut Scene, report: &mut StepReport) {
+        let count = self.islands.len();
+        for island in 0..count {
+            let solve = &mut self.solves[island];
+            if !solve.start_over_without_recovery(scene) {
+                continue;
+            }
+            self.workspace.solve(solve, &scene.settings.solver);
+            solve.report.add_to(report);
+            for &member in self.islands.members(island) {
+                let active = self.active[member as usize];
+                let body = &mut scene.bodies[active.id];
+                if body.quarantined {
+                    continue;
+                }
+                if let Some(figure) = solve.problem.figures.list().get(active.figure as usize) {
+                    body.set_figure_rates(&figure.v1, scene.state);
+                } else if let Some(node) = solve.node(active.start) {
+                    let twist = solve.problem.frames[active.start as usize].twist();
+                    body.keep_twist(node, twist, scene.state);
+                }
+            }
+            solve.take_back_forces(scene);
+        }
+    }
+}
+
+impl Solve {
+    /// Prepares the second solution, which goes on from where the first one ended. Answers whether one is wanted.
+    fn start_over_without_recovery(&mut self, scene: &Scene) -> bool {
+        let contacts = &mut self.problem.terms.contacts;
+        let is_deep = contacts.iter().any(|contact| contact.recovers());
+        if is_deep {
+            contacts.iter_mut().for_each(|contact| contact.stop_recovery());
+            self.is_pending = true;
+        }
+        is_deep && scene.settings.contact.recovery_speed > 0.0
+    }
+
+    /// Contacts remember the forces of the second solution.
+    fn take_back_forces(&self, scene: &mut Scene) {
+        let (problem, dt) = (&self.problem, self.problem.dt);
+        for (term, &source) in problem.terms.contacts.iter().zip(&self.contacts) {
+            let force = term.normal_force(dt, problem.pair(term));
+            scene.contacts[source as usize].normal_force = finite_or_zero(DVec3::X * force).x;
+        }
+    }
+}
