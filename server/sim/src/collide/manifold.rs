@@ -11,6 +11,8 @@ const CANDIDATES_MAX: usize = 16;
 
 /// Points of neighbouring triangles that are nearer to each other are one, m.
 const SAME_PLACE: f64 = 1e-6;
+/// Candidates whose gaps differ by less are chosen from by area, m.
+const SPREAD: f64 = 0.01;
 
 /// A candidate for a contact point.
 #[derive(Clone, Copy, Debug)]
@@ -63,6 +65,9 @@ impl Manifold {
     /// largest area to either side of that line.
     pub fn reduced(&mut self) -> &[ManifoldPoint] {
         if self.points.len() > POINTS_MAX {
+            self.drop_far_points();
+        }
+        if self.points.len() > POINTS_MAX {
             let normal = self.normal;
             self.bring(0, |_, p| -p.gap);
             self.bring(1, |chosen, p| (p.position - chosen[0].position).length_squared());
@@ -75,6 +80,15 @@ impl Manifold {
             self.points.truncate(POINTS_MAX);
         }
         &self.points
+    }
+
+    /// Drops what is farther than the fourth nearest by more than [`SPREAD`]: margins of fast bodies let in their far side,
+    /// and a box does not stand on that.
+    fn drop_far_points(&mut self) {
+        let mut gaps: ArrayVec<f64, CANDIDATES_MAX> = self.points.iter().map(|p| p.gap).collect();
+        gaps.sort_unstable_by(f64::total_cmp);
+        let limit = gaps[POINTS_MAX - 1] + SPREAD;
+        self.points.retain(|p| p.gap <= limit);
     }
 
     /// Swaps the best of the points from `place` on to `place`; ties go to the earlier candidate.
@@ -94,6 +108,19 @@ impl Manifold {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_far_side_of_a_box_is_not_what_it_stands_on() {
+        let mut manifold = Manifold { normal: DVec3::NEG_Y, ..Manifold::default() };
+        for corner in 0..8u32 {
+            let sign = |bit: u32| if corner & bit == 0 { -1.0 } else { 1.0 };
+            let position = DVec3::new(sign(1), 2.0 + sign(2), sign(4));
+            manifold.offer(ManifoldPoint { position, gap: position.y, feature: corner });
+        }
+        let mut kept: Vec<_> = manifold.reduced().iter().map(|p| p.feature).collect();
+        kept.sort_unstable();
+        assert_eq!(kept, [0, 1, 4, 5]);
+    }
 
     #[test]
     fn eight_points_of_a_face_become_its_four_corners() {
