@@ -42,6 +42,9 @@ const STEADY: (f64, f64) = (0.6, 2.0);
 /// A load is steady where the contact closes or opens at less than this at the start of the tick, m/s, and where it
 /// changed by less than this share since the last. To follow impacts cost a slammed jelly its solution.
 const RESTING_SPEED: f64 = 0.1;
+
+/// What closes at this speed when the tick starts hits, m/s.
+const BLOW_SPEED: f64 = 0.5;
 const CHANGE: f64 = 0.3;
 
 /// How much stiffer than an impact a contact is that parts its bodies: what it gives way is missing from the bounce, with
@@ -415,7 +418,9 @@ impl Term for ContactTerm {
 
     fn stiffen(&mut self, dt: f64, at: [&Frame<f64>; 2]) -> bool {
         let depth = self.depth(self.displacement(dt, at));
-        let grows = depth > FAR_TOO_DEEP * self.tolerance && self.stiffening < self.most_stiffening;
+        // A blow is no load: what it presses in for a tick is the impact's own stiffness to bear.
+        let bears = self.start_speed < BLOW_SPEED;
+        let grows = bears && depth > FAR_TOO_DEEP * self.tolerance && self.stiffening < self.most_stiffening;
         if grows {
             let wanted = self.stiffening * depth / (SHARE * self.tolerance);
             let growth = wanted.min(self.most_stiffening) / self.stiffening;
