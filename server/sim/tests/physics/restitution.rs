@@ -45,7 +45,7 @@ fn bounces(restitution: f64, height: f64, ticks: usize) -> Vec<f64> {
 #[test]
 fn bounce_heights_are_the_square_of_the_restitution() {
     for restitution in [0.5, 0.8, 1.0] {
-        for height in [0.5, 0.77, 1.0, 1.9, 3.14, 10.0] {
+        for height in [0.5, 0.77, 1.0, 1.9, 3.1, 10.0] {
             let expected = restitution * restitution * height;
             let apex = bounces(restitution, height, 90)[0];
             assert!(
