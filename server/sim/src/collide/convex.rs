@@ -6,6 +6,7 @@ use parry3d_f64::query::ContactManifold;
 use parry3d_f64::query::details::NormalConstraints;
 use parry3d_f64::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeatureMap};
 
+use super::boxes;
 use super::gjk::{Found, Nearest, Pair, Workspace};
 use super::manifold::{Manifold, ManifoldPoint};
 
@@ -22,6 +23,8 @@ const STRAIGHT: f64 = 1.0 - 1e-6;
 #[derive(Clone, Copy)]
 pub(super) struct Convex<'a> {
     pub core: &'a dyn PolygonalFeatureMap,
+    /// Half extents where it is a box, m.
+    pub half: Option<DVec3>,
     pub radius: f64,
     pub pose: ParryPose,
     /// Normals that a neighbouring triangle leaves, in the core's axes.
@@ -56,6 +59,9 @@ impl Finder {
         let b_in_a = a.pose.inv_mul(&b.pose);
         let radii = a.radius + b.radius;
         let pair = Pair { a: a.core, b: b.core, b_in_a: &b_in_a };
+        if let Some(normal) = self.overlapping_boxes(&pair, [a, b], margin, out) {
+            return Some(normal);
+        }
         let nearest = match pair.nearest(margin + radii, last, &mut self.workspace) {
             Found::Beyond(direction) => return Some(direction),
             Found::Nearest(nearest) => nearest,
@@ -71,11 +77,10 @@ impl Finder {
         let hints = if is_turned { pair.support(normal) } else { [on_a, on_b] };
         self.clip(&pair, normal, normal_b, hints);
         out.normal = a.pose.rotation * normal;
+        let sides = Sides { a, b, normal, margin };
         let mut offer = |on_a: DVec3, on_b: DVec3, along: f64, feature: u32| {
-            if along >= gap - DEEPER && along - radii < margin {
-                // On the surfaces the two are `radii` nearer to each other, each by its own radius.
-                let middle = (on_a + on_b + normal * (a.radius - b.radius)) / 2.0;
-                out.offer(ManifoldPoint { position: a.pose * middle, gap: along - radii, feature });
+            if along >= gap - DEEPER {
+                sides.offer([on_a, on_b], along, feature, out);
             }
         };
         for point in &self.clipped.points {
@@ -90,6 +95,30 @@ impl Finder {
         Some(free)
     }
 
+    /// Boxes that overlap, where the faces that look at each other have a point as deep as they are: not where it is two
+    /// edges that touch. Answers their normal.
+    fn overlapping_boxes(
+        &mut self,
+        pair: &Pair,
+        [a, b]: [Convex; 2],
+        margin: f64,
+        out: &mut Manifold,
+    ) -> Option<DVec3> {
+        let (normal, gap) = boxes::least_overlap([a.half?, b.half?], pair.b_in_a)?;
+        self.clip(pair, normal, pair.b_in_a.rotation.inverse() * -normal, pair.support(normal));
+        let points = || self.clipped.points.iter().filter(|point| point.dist >= gap - DEEPER);
+        if points().all(|point| point.dist > gap + DEEPER) {
+            return None;
+        }
+        out.normal = a.pose.rotation * normal;
+        let sides = Sides { a, b, normal, margin };
+        for point in points() {
+            let places = [point.local_p1, *pair.b_in_a * point.local_p2];
+            sides.offer(places, point.dist, name(point.fid1, point.fid2), out);
+        }
+        Some(normal)
+    }
+
     /// Where the faces that look along the normal lie above each other, those near to two points.
     fn clip(&mut self, pair: &Pair, normal: DVec3, normal_b: DVec3, [on_a, on_b]: [DVec3; 2]) {
         self.clipped.points.clear();
@@ -100,6 +129,28 @@ impl Finder {
         if face_a.num_vertices.min(face_b.num_vertices) > 1 {
             let (a_in_b, clipped) = (b_in_a.inverse(), &mut self.clipped);
             PolygonalFeature::contacts(b_in_a, &a_in_b, normal, normal_b, face_a, face_b, clipped, false);
+        }
+    }
+}
+
+/// Two sides of a manifold, and its normal in the first one's axes.
+struct Sides<'a> {
+    a: Convex<'a>,
+    b: Convex<'a>,
+    normal: DVec3,
+    margin: f64,
+}
+
+impl Sides<'_> {
+    /// Takes a point that is so far along the normal from the first core to the second, if the surfaces are within the
+    /// margin there. Places are in the first one's axes.
+    fn offer(&self, [on_a, on_b]: [DVec3; 2], along: f64, feature: u32, out: &mut Manifold) {
+        let Self { a, b, normal, margin } = *self;
+        // On the surfaces the two are nearer to each other, each by its own radius.
+        let gap = along - a.radius - b.radius;
+        if gap < margin {
+            let middle = (on_a + on_b + normal * (a.radius - b.radius)) / 2.0;
+            out.offer(ManifoldPoint { position: a.pose * middle, gap, feature });
         }
     }
 }

@@ -30,6 +30,14 @@ impl Core {
             Self::Polytope(polytope) => polytope,
         }
     }
+
+    /// Half extents of a box, m.
+    pub fn half(&self) -> Option<DVec3> {
+        match self {
+            Self::Box(cuboid) => Some(cuboid.half_extents),
+            _ => None,
+        }
+    }
 }
 
 /// The origin.

@@ -4,6 +4,7 @@
 //! moves far: three `trees` of k-DOPs prune, `narrow_phase` finds the
 //! points. What comes out are contact points; [`potential::contact`](crate::potential) makes potentials of them.
 
+mod boxes;
 mod collision;
 mod convex;
 mod core;

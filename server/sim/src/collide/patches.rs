@@ -59,7 +59,7 @@ impl Patches {
         let max = middle + DVec3::from_array(ends.map(|(_, high)| high)) + margin;
         let surface = ParryPose::from_parts(pose.position, pose.rotation);
         for (triangle, normals) in mesh.in_box(min, max) {
-            let piece = Convex { core: &triangle, radius: 0.0, pose: surface, constraints: Some(&normals) };
+            let piece = Convex { core: &triangle, half: None, radius: 0.0, pose: surface, constraints: Some(&normals) };
             self.scratch.clear();
             finder.contacts(body, piece, margin, None, &mut self.scratch);
             let normal = self.scratch.normal;

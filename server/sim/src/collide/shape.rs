@@ -284,7 +284,7 @@ impl Collider {
     pub(super) fn convex(&self, pose: crate::dof::Pose) -> Option<Convex<'_>> {
         let (core, radius, rotation) = self.core.as_ref()?;
         let pose = ParryPose::from_parts(pose.position, pose.rotation * *rotation);
-        Some(Convex { core: core.map(), radius: *radius, pose, constraints: None })
+        Some(Convex { core: core.map(), half: core.half(), radius: *radius, pose, constraints: None })
     }
 }
 
