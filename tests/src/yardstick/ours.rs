@@ -55,7 +55,8 @@ pub fn world_of_beam(beam: &Beam, settings: &Settings) -> Result<World, SimError
     let material = Elastic::new(beam.young_modulus, beam.poisson_ratio)?;
     let body = FiniteElements::new(&mesh, material, Density::constant(beam.density), &clamped)?;
     let (q, v) = (body.rest(), body.still());
-    let mut world = World::new(settings.clone())?;
+    // The kit's rules: nothing sleeps.
+    let mut world = World::new(Settings { sleep: None, ..settings.clone() })?;
     world.add_figure(FigureDesc { dof: Arc::new(body), q, v, colliders: Vec::new() })?;
     Ok(world)
 }
