@@ -195,6 +195,8 @@ impl Publishing {
         match event {
             ArenaEvent::ActorAdded(actor) => self.publish_event(Event::ActorAdded(description::actor(&actor))),
             ArenaEvent::ActorRemoved(id) => self.publish_event(Event::ActorRemoved { id }),
+            // The wire has no words for effects yet.
+            ArenaEvent::Effect(_) => {}
             ArenaEvent::Entered { slot, name } => {
                 self.publish_event(Event::Joined { slot, name });
                 if let Some(id) = self.ledger.entered(slot) {

@@ -1,11 +1,12 @@
 //! Things with game logic.
 //!
-//! An actor owns the bodies that it added to the world and is the only one to push on them. It acts in stage 3 and
-//! only through forces and actuators; poses are set only to place it anew.
+//! An actor owns the bodies that it added to the world: they come and go with it, and it alone places them anew. What it
+//! does to the world, itself and others, it does through forces, actuators and potentials, in stage 3.
 
 use pita_sim::{BodyId, DVec3, Phase, Shape, SimError, StaticId, World};
 
 use crate::rehearsal::Memory;
+use crate::step::{Message, Step};
 use crate::{Controls, Pose};
 
 /// Description of an actor, for the wire and for people.
@@ -13,7 +14,7 @@ use crate::{Controls, Pose};
 pub struct ActorInfo {
     /// Identifies the actor for as long as it lives; never used twice in a run.
     pub id: u32,
-    /// `vehicle`, `prop`.
+    /// `vehicle`, `crate`, `tornado`.
     pub kind: &'static str,
     /// What a person calls it; the player's name for a player's vehicle.
     pub name: String,
@@ -30,14 +31,6 @@ pub struct PartInfo {
     pub slice: u32,
     /// Shape in the slice's frame.
     pub shape: Shape,
-}
-
-/// What an actor may touch in stage 3.
-pub struct Step<'a> {
-    /// The world, contacts of this tick included.
-    pub world: &'a mut World,
-    /// Length of the tick, s.
-    pub dt: f64,
 }
 
 /// A collision of an actor, as stage 2 found it.
@@ -98,7 +91,19 @@ pub enum Response {
     Pass,
 }
 
-/// A thing with game logic.
+/// What becomes of an actor that left the arena's bounds or that the engine took out of the world.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum WhenLost {
+    /// It is gone.
+    #[default]
+    Remove,
+    /// [`Actor::place`] puts it there.
+    Home(Pose),
+    /// [`Actor::place`] puts it to a free spawn point.
+    Spawn,
+}
+
+/// A thing with game logic. [`Actor::describe`] and [`Actor::bodies`] are all that one must have.
 pub trait Actor: Send {
     /// What it is.
     fn describe(&self) -> &ActorInfo;
@@ -123,20 +128,32 @@ pub trait Actor: Send {
         Response::Collide
     }
 
-    /// Stage 3: sets forces and actuators for this tick's integration.
+    /// Stage 3: sets forces and actuators for this tick's integration, and asks for what it wants of the arena.
     ///
     /// # Errors
-    /// What the engine refused; the arena then puts the actor back.
+    /// What the engine refused; the actor then counts as lost.
     fn step(&mut self, _step: &mut Step) -> Result<(), SimError> {
         Ok(())
     }
 
-    /// Where it is put when it got lost; `None` for a free spawn point.
-    fn home(&self) -> Option<Pose>;
+    /// Stage 3, after every [`Actor::step`]: what actor `from` told this one in this tick. Acting on it has to wait for
+    /// the next step.
+    fn hear(&mut self, _from: u32, _message: &Message) {}
+
+    /// What becomes of it when it is lost.
+    fn when_lost(&self) -> WhenLost {
+        WhenLost::default()
+    }
 
     /// Puts it at `pose`, upright and at rest.
     ///
     /// # Errors
     /// What the engine says where it refuses the pose.
-    fn place(&mut self, world: &mut World, pose: Pose) -> Result<(), SimError>;
+    fn place(&mut self, _world: &mut World, _pose: Pose) -> Result<(), SimError> {
+        Ok(())
+    }
+
+    /// It goes: takes out of the world what it added to bodies of others and to static geometry. Its own bodies, and
+    /// all that is between them, go by themselves.
+    fn leave(&mut self, _world: &mut World) {}
 }

@@ -5,6 +5,7 @@
 
 mod build;
 mod collisions;
+mod logic;
 mod players;
 mod rehearsed;
 
@@ -14,10 +15,11 @@ use glam::{DQuat, DVec3};
 use pita_sim::{BodyId, Collision, Shape, World};
 
 use crate::Controls;
-use crate::actor::{Actor, ActorInfo, Step};
+use crate::actor::{Actor, ActorInfo};
 use crate::arena_file::{BoundsFile, Materials};
 use crate::pipeline::Ports;
-use crate::spawn::{self, Pose};
+use crate::spawn::Pose;
+use crate::step::{Effect, LogicReport, Other, Request};
 use crate::vehicle::VehicleParameters;
 
 /// What the caller decides about an arena, not its file.
@@ -62,6 +64,8 @@ pub enum ArenaEvent {
     ActorAdded(ActorInfo),
     /// The actor with this id and all its bodies are gone.
     ActorRemoved(u32),
+    /// Something to see or hear.
+    Effect(Effect),
     /// A player has a slot now.
     Entered {
         /// Slot.
@@ -115,8 +119,11 @@ pub struct Arena {
     events: Vec<ArenaEvent>,
     /// Kept from tick to tick for its memory.
     commands: Vec<Command>,
-    /// Likewise: actors of this tick.
-    acting: Vec<u32>,
+    /// Likewise: those who are lost, and what actors are told of each other and ask for, in this tick.
+    lost: Vec<u32>,
+    others: Vec<Other>,
+    requests: Vec<Request>,
+    logic: LogicReport,
     /// Likewise: collisions of this tick.
     collisions: Vec<Collision>,
 }
@@ -165,6 +172,11 @@ impl Arena {
         self.slots.get(&slot).and_then(|id| self.actors.get(id)).map(|actor| actor.describe())
     }
 
+    /// An actor by its id.
+    pub fn actor(&self, id: u32) -> Option<&dyn Actor> {
+        self.actors.get(&id).map(|actor| &**actor)
+    }
+
     /// The surfaces of the arena.
     pub fn materials(&self) -> &Materials {
         &self.materials
@@ -173,6 +185,11 @@ impl Arena {
     /// What happened in the last tick, in order.
     pub fn events(&self) -> &[ArenaEvent] {
         &self.events
+    }
+
+    /// What logic did in the last tick.
+    pub fn logic(&self) -> &LogicReport {
+        &self.logic
     }
 
     /// Stage 1: takes the commands that came in since the last tick and applies them.
@@ -191,52 +208,9 @@ impl Arena {
         self.world.detect_collisions();
     }
 
-    /// Stage 3: lets every actor judge its collisions, puts back what got lost, and lets every actor act, in order of id.
-    pub(crate) fn run_logic(&mut self) {
-        self.judge_collisions();
-        let mut ids = std::mem::take(&mut self.acting);
-        ids.clear();
-        ids.extend(self.actors.keys());
-        for &id in &ids {
-            if self.is_lost(id) {
-                self.put_back(id);
-            }
-            let Some(actor) = self.actors.get_mut(&id) else { continue };
-            let mut step = Step { world: &mut self.world, dt: self.dt };
-            if actor.step(&mut step).is_err() {
-                self.put_back(id);
-            }
-        }
-        self.acting = ids;
-    }
-
     /// Stage 4: one implicit step of the whole world.
     pub(crate) fn integrate(&mut self) {
         self.world.integrate();
         self.ticks += 1;
-    }
-
-    /// Whether an actor left the world, or the engine took one of its bodies out of it.
-    fn is_lost(&self, id: u32) -> bool {
-        let bodies = self.actors.get(&id).map(|actor| actor.bodies()).unwrap_or_default();
-        bodies.iter().any(|&body| {
-            let inside = self.world.position(body).is_some_and(|at| self.bounds.contains(at));
-            !inside || self.world.is_quarantined(body)
-        })
-    }
-
-    /// Puts an actor back to its home or to a free spawn point.
-    fn put_back(&mut self, id: u32) {
-        let free = spawn::choose(&self.spawns, &self.positions_but(id));
-        let Some(actor) = self.actors.get_mut(&id) else { return };
-        let pose = actor.home().unwrap_or(free);
-        // Homes and spawn points are checked when the arena is built: the engine has no reason to refuse one.
-        let _refused = actor.place(&mut self.world, pose);
-    }
-
-    /// Where every actor but `id` is.
-    fn positions_but(&self, id: u32) -> Vec<DVec3> {
-        let others = self.actors.iter().filter(|(other, _)| **other != id);
-        others.filter_map(|(_, actor)| self.world.position(actor.bodies()[0])).collect()
     }
 }

@@ -18,10 +18,11 @@ pub use key::Key;
 pub use material::{MaterialFile, MaterialPairFile, Materials};
 pub use shape::{Angles, ShapeFile};
 pub use solver::SolverFile;
-pub use tables::{ArenaFile, BoundsFile, DriverFile, PropFile, RouteFile, SpawnFile, SpawnGridFile, StaticFile};
+pub use tables::{ActorFile, ArenaFile, BoundsFile, DriverFile, RouteFile, SpawnFile, SpawnGridFile, StaticFile};
 
 /// Longest arena file, bytes: a bound on what reading it can cost.
 pub const FILE_MAX: usize = 1 << 20;
+
 /// Why an arena was refused. The text is for the person who wrote the file and says where to look.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ArenaError {
@@ -45,6 +46,16 @@ pub enum ArenaError {
         /// What it may be, with unit.
         allowed: String,
     },
+    /// A key of an actor's own that does not exist or is missing, or a value of another type.
+    #[error("{key}, of kind {kind}: {message}")]
+    Parameters {
+        /// Path of the actor's table.
+        key: String,
+        /// The actor's kind.
+        kind: &'static str,
+        /// What is wrong there.
+        message: String,
+    },
     /// The engine refused something that the file's own ranges allow.
     #[error("{key}: {source}")]
     Engine {
@@ -59,7 +70,7 @@ impl ArenaFile {
     /// Reads and checks.
     ///
     /// # Errors
-    /// Any [`ArenaError`] but `Engine`.
+    /// [`ArenaError::Syntax`] and [`ArenaError::OutOfRange`].
     pub fn parse(text: &str) -> Result<Self, ArenaError> {
         Key::new("length of the file").count(text.len(), 1, FILE_MAX, "bytes")?;
         let file: Self = toml::from_str(text).map_err(|e| syntax_error(text, &e))?;

@@ -1,7 +1,7 @@
 //! PITA's game: arenas and actors on the engine, and the pipeline that runs them.
 //!
 //! Owns: the five stages of a tick ([`pipeline`]), arenas and their files ([`arena`], [`arena_file`]), what acts in them
-//! ([`actor`], [`vehicle`], [`prop`], [`driver`]), and the controls that players send ([`controls`]). It may touch the
+//! ([`actor`], [`step`], [`kinds`], [`vehicle`], [`prop`], [`driver`]), and the controls that players send ([`controls`]). It may touch the
 //! engine, `pita-sim`, and nothing else: no clock, no disk, no network, no randomness. What a tick needs from outside
 //! comes in through [`Ports`].
 //!
@@ -12,19 +12,25 @@
 pub mod actor;
 pub mod arena;
 pub mod arena_file;
+pub mod assembly;
 pub mod controls;
 pub mod driver;
+pub mod kinds;
 pub mod pipeline;
 pub mod prop;
 pub mod rehearsal;
 pub mod scene;
+pub mod scheduler;
 pub mod spawn;
+pub mod step;
 pub mod vehicle;
 
-pub use actor::{Actor, ActorInfo, Contact, ContactSide, PartInfo, Partner, Response};
+pub use actor::{Actor, ActorInfo, Contact, ContactSide, PartInfo, Partner, Response, WhenLost};
 pub use arena::{Arena, ArenaEvent, ArenaSettings, Command, StaticInfo};
 pub use arena_file::ArenaError;
 pub use controls::Controls;
+pub use kinds::{ActorKind, ActorKinds, Site};
 pub use pipeline::{Ports, Stage};
 pub use rehearsal::{BodyState, CarState, Memory, Rehearsal};
 pub use spawn::Pose;
+pub use step::{Effect, LogicReport, Message, Other, Step};

@@ -1,48 +1,59 @@
 //! Loose things to knock over: one body, no logic.
 
-use pita_sim::{BodyId, Collider, Material, RigidBodyDesc, Shape, SimError, World};
+use pita_sim::{BodyId, Shape, SimError, World};
+use serde::Deserialize;
 
-use crate::actor::{Actor, ActorInfo, PartInfo};
+use crate::actor::{Actor, ActorInfo, WhenLost};
+use crate::arena_file::{ArenaError, ArenaFile, Key, ShapeFile};
+use crate::assembly::{Assembly, Piece};
+use crate::kinds::{ActorKind, Site};
 use crate::spawn::Pose;
 use glam::DVec3;
 
-/// What a prop is made of.
-#[derive(Clone, Debug)]
-pub struct PropDesc {
-    /// `crate`, `ball`, ...
-    pub name: String,
-    /// Its shape, m.
-    pub shape: Shape,
-    /// Mass, kg.
+/// Keys of `kind = "prop"`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PropParameters {
+    /// Its shape, around its place.
+    pub shape: ShapeFile,
+    /// Name of its material.
+    pub material: String,
+    /// Kg.
     pub mass: f64,
-    /// What it is made of.
-    pub material: Material,
-    /// Where its centre is, m, and its heading.
-    pub home: Pose,
 }
 
 /// A loose thing.
 pub struct Prop {
     info: ActorInfo,
-    bodies: [BodyId; 1],
+    assembly: Assembly,
     home: Pose,
 }
 
+impl ActorKind for Prop {
+    const KIND: &'static str = "prop";
+    type Parameters = PropParameters;
+
+    fn check(parameters: &PropParameters, key: &Key, file: &ArenaFile) -> Result<(), ArenaError> {
+        let PropParameters { shape, material, mass } = parameters;
+        key.at("shape").require(shape.is_bounded(), "half_space", "box, ball, capsule or cylinder")?;
+        shape.check(&key.at("shape"))?;
+        file.check_material(&key.at("material"), material)?;
+        key.at("mass").number(*mass, 0.01, 1e6, "kg")
+    }
+
+    fn add(site: &mut Site, parameters: &PropParameters) -> Result<Self, SimError> {
+        let PropParameters { shape, material, mass } = parameters;
+        let piece = Piece::new(Shape::from(shape), *mass, site.material(material), DVec3::ZERO);
+        Self::of_piece(site, Self::KIND, piece)
+    }
+}
+
 impl Prop {
-    /// Adds the prop to `world`.
-    ///
-    /// # Errors
-    /// What the engine says where it refuses the body.
-    pub fn add(world: &mut World, id: u32, desc: PropDesc) -> Result<Self, SimError> {
-        let inertia = desc.shape.inertia(desc.mass);
-        let body = world.add_rigid_body(RigidBodyDesc {
-            rotation: desc.home.rotation(),
-            collider: Some(Collider::new(desc.shape.clone(), desc.material)),
-            ..RigidBodyDesc::new(desc.home.position, desc.mass, inertia)
-        })?;
-        let parts = vec![PartInfo { slice: world.serial(body).unwrap_or_default(), shape: desc.shape }];
-        let info = ActorInfo { id, kind: "prop", name: desc.name, slot: None, parts };
-        Ok(Self { info, bodies: [body], home: desc.home })
+    /// A loose thing of any kind.
+    fn of_piece(site: &mut Site, kind: &'static str, piece: Piece) -> Result<Self, SimError> {
+        let mut assembly = Assembly::at(site.pose);
+        assembly.add(site.world, piece)?;
+        Ok(Self { info: site.info(kind, assembly.parts()), assembly, home: site.pose })
     }
 }
 
@@ -52,15 +63,14 @@ impl Actor for Prop {
     }
 
     fn bodies(&self) -> &[BodyId] {
-        &self.bodies
+        self.assembly.bodies()
     }
 
-    fn home(&self) -> Option<Pose> {
-        Some(self.home)
+    fn when_lost(&self) -> WhenLost {
+        WhenLost::Home(self.home)
     }
 
     fn place(&mut self, world: &mut World, pose: Pose) -> Result<(), SimError> {
-        world.set_pose(self.bodies[0], pose.position, pose.rotation())?;
-        world.set_velocity(self.bodies[0], DVec3::ZERO, DVec3::ZERO)
+        self.assembly.place(world, pose)
     }
 }

@@ -11,9 +11,10 @@ pub mod rig;
 use glam::DVec3;
 use pita_sim::{AxleControl, BodyId, Motor, SimError, World};
 
-use crate::actor::{Actor, ActorInfo, Step};
+use crate::actor::{Actor, ActorInfo, WhenLost};
 use crate::driver::{Driver, Motion};
 use crate::rehearsal::Memory;
+use crate::step::Step;
 use crate::{Controls, Pose};
 pub use parameters::{Drive, VehicleParameters};
 use response::Response;
@@ -176,8 +177,8 @@ impl Actor for Vehicle {
         Ok(())
     }
 
-    fn home(&self) -> Option<Pose> {
-        None
+    fn when_lost(&self) -> WhenLost {
+        WhenLost::Spawn
     }
 
     fn place(&mut self, world: &mut World, pose: Pose) -> Result<(), SimError> {

@@ -6,10 +6,11 @@ use glam::DVec3;
 use pita_sim::{Collider, Material, Settings, Shape, SimError, StaticDesc, World};
 
 use super::{Arena, ArenaSettings, StaticInfo};
-use crate::arena_file::{ArenaError, ArenaFile, DriverFile, Key, Materials, PropFile};
+use crate::arena_file::{ActorFile, ArenaError, ArenaFile, DriverFile, Key, Materials};
 use crate::driver::{Driver, RouteDriver};
-use crate::prop::{Prop, PropDesc};
+use crate::kinds::{ActorKinds, Recipe, Site};
 use crate::spawn::Pose;
+use crate::step::LogicReport;
 use crate::vehicle::{Identity, Vehicle};
 
 impl Arena {
@@ -18,10 +19,24 @@ impl Arena {
     /// # Errors
     /// Any [`ArenaError`]; it names the key, its value and what is allowed.
     pub fn from_toml(text: &str, settings: &ArenaSettings) -> Result<Self, ArenaError> {
-        Self::from_file(&ArenaFile::parse(text)?, settings)
+        Self::from_toml_with(text, settings, &ActorKinds::built_in())
     }
 
-    pub(super) fn from_file(file: &ArenaFile, settings: &ArenaSettings) -> Result<Self, ArenaError> {
+    /// The same with the kinds of actors that `kinds` knows, a game's own among them.
+    ///
+    /// # Errors
+    /// Any [`ArenaError`].
+    pub fn from_toml_with(text: &str, settings: &ArenaSettings, kinds: &ActorKinds) -> Result<Self, ArenaError> {
+        Self::from_file(&ArenaFile::parse(text)?, settings, kinds)
+    }
+
+    pub(super) fn from_file(
+        file: &ArenaFile,
+        settings: &ArenaSettings,
+        kinds: &ActorKinds,
+    ) -> Result<Self, ArenaError> {
+        let recipes = file.actors.iter().enumerate().map(|(i, actor)| kinds.recipe(i, actor, file));
+        let recipes = recipes.collect::<Result<Vec<_>, _>>()?;
         Key::new("tick_hz").count(settings.tick_hz.into(), 1, 1_000, "Hz")?;
         let dt = 1.0 / f64::from(settings.tick_hz);
         let gravity = DVec3::NEG_Y * file.gravity;
@@ -47,11 +62,14 @@ impl Arena {
             slots: BTreeMap::new(),
             events: Vec::new(),
             commands: Vec::new(),
-            acting: Vec::new(),
+            lost: Vec::new(),
+            others: Vec::new(),
+            requests: Vec::new(),
+            logic: LogicReport::default(),
         };
         arena.set_material_pairs(file)?;
         arena.add_statics(file)?;
-        arena.add_props(file)?;
+        arena.add_actors(file, &recipes)?;
         arena.add_drivers(file)?;
         // What was there from the start is in the description, it did not happen.
         arena.events.clear();
@@ -80,19 +98,15 @@ impl Arena {
         Ok(())
     }
 
-    fn add_props(&mut self, file: &ArenaFile) -> Result<(), ArenaError> {
-        for (i, prop) in file.props.iter().enumerate() {
-            for home in homes(prop) {
-                let desc = PropDesc {
-                    name: prop.name.clone(),
-                    shape: Shape::from(&prop.shape),
-                    mass: prop.mass,
-                    material: material(&self.materials, &prop.material),
-                    home,
-                };
+    /// Adds what `recipes` make of each of the file's actors.
+    fn add_actors(&mut self, file: &ArenaFile, recipes: &[Recipe]) -> Result<(), ArenaError> {
+        for (i, (actor, recipe)) in file.actors.iter().zip(recipes).enumerate() {
+            for pose in places(actor) {
                 let id = self.new_id();
-                let added = Prop::add(&mut self.world, id, desc).map_err(refused(&Key::new("props").index(i)))?;
-                self.add(Box::new(added));
+                let (world, materials, name) = (&mut self.world, &self.materials, actor.name());
+                let mut site = Site { world, id, name, pose, file, materials };
+                let added = recipe(&mut site).map_err(refused(&Key::new("actors").index(i)))?;
+                self.add(added);
             }
         }
         Ok(())
@@ -138,11 +152,11 @@ fn spawn_points(file: &ArenaFile) -> Vec<Pose> {
 }
 
 /// Place of each copy, lowest layer first.
-fn homes(prop: &PropFile) -> impl Iterator<Item = Pose> {
-    let [nx, ny, nz] = prop.copies;
-    let first = DVec3::from_array(prop.position);
-    let spacing = DVec3::from_array(prop.spacing);
-    let yaw = prop.yaw.to_radians();
+fn places(actor: &ActorFile) -> impl Iterator<Item = Pose> {
+    let [nx, ny, nz] = actor.copies;
+    let first = DVec3::from_array(actor.position);
+    let spacing = DVec3::from_array(actor.spacing);
+    let yaw = actor.yaw.to_radians();
     let cells = (0..ny).flat_map(move |iy| (0..nx).flat_map(move |ix| (0..nz).map(move |iz| [ix, iy, iz])));
     cells.map(move |[ix, iy, iz]| {
         let cell = DVec3::new(ix as f64, iy as f64, iz as f64);

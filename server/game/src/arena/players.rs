@@ -1,9 +1,6 @@
 //! Players come, drive and leave.
 
-use pita_sim::{SimError, World};
-
 use super::{Arena, ArenaEvent, Command};
-use crate::Actor;
 use crate::driver::Driver;
 use crate::spawn;
 use crate::vehicle::{Identity, Vehicle};
@@ -44,42 +41,5 @@ impl Arena {
         let Some(id) = self.slots.remove(&slot) else { return };
         self.remove(id);
         self.events.push(ArenaEvent::Left { slot, reason });
-    }
-
-    /// An id that no actor of this run ever had.
-    pub(super) fn new_id(&mut self) -> u32 {
-        let id = self.next_actor;
-        self.next_actor += 1;
-        id
-    }
-
-    /// Adds an actor of a game's own: `build` is given the world, to add its bodies, and the actor's id.
-    ///
-    /// # Errors
-    /// What `build` says; nothing is added then.
-    pub fn add_actor(
-        &mut self,
-        build: impl FnOnce(&mut World, u32) -> Result<Box<dyn Actor>, SimError>,
-    ) -> Result<u32, SimError> {
-        let id = self.new_id();
-        let actor = build(&mut self.world, id)?;
-        self.add(actor);
-        Ok(id)
-    }
-
-    pub(super) fn add(&mut self, actor: Box<dyn Actor>) {
-        let info = actor.describe().clone();
-        self.owners.extend(actor.bodies().iter().map(|&body| (body, info.id)));
-        self.actors.insert(info.id, actor);
-        self.events.push(ArenaEvent::ActorAdded(info));
-    }
-
-    fn remove(&mut self, id: u32) {
-        let Some(actor) = self.actors.remove(&id) else { return };
-        for &body in actor.bodies() {
-            self.owners.remove(&body);
-            self.world.remove_body(body);
-        }
-        self.events.push(ArenaEvent::ActorRemoved(id));
     }
 }

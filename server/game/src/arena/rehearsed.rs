@@ -2,15 +2,16 @@
 
 use super::{Arena, ArenaSettings};
 use crate::arena_file::{ArenaError, ArenaFile};
+use crate::kinds::ActorKinds;
 use crate::rehearsal::{BodyState, Memory};
 
 impl Arena {
-    /// The arena that `text` describes, without props and drivers.
+    /// The arena that `text` describes, without actors and drivers.
     pub(crate) fn without_actors(text: &str, settings: &ArenaSettings) -> Result<Self, ArenaError> {
         let mut file = ArenaFile::parse(text)?;
-        file.props.clear();
+        file.actors.clear();
         file.drivers.clear();
-        Self::from_file(&file, settings)
+        Self::from_file(&file, settings, &ActorKinds::none())
     }
 
     /// Bodies and memory of the actor of `slot`; nothing where there is none.

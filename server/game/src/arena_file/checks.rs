@@ -2,7 +2,7 @@
 
 use super::{ArenaError, ArenaFile, Key, material};
 
-/// Most statics, spawn points and props each, copies and grids counted.
+/// Most statics, spawn points and actors each, copies and grids counted.
 const THINGS_MAX: usize = 4_096;
 /// Most cars of the arena's own.
 const DRIVERS_MAX: usize = 256;
@@ -26,7 +26,7 @@ impl ArenaFile {
         self.vehicle.check(&Key::new("vehicle"))?;
         self.check_statics()?;
         self.check_spawns()?;
-        self.check_props()?;
+        self.check_actors()?;
         self.check_routes()
     }
 
@@ -40,7 +40,10 @@ impl ArenaFile {
     }
 
     /// What is put back must not be lost where it is put.
-    fn check_inside(&self, key: &Key, point: [f64; 3]) -> Result<(), ArenaError> {
+    ///
+    /// # Errors
+    /// [`ArenaError::OutOfRange`] unless `point`, m, is within the bounds.
+    pub fn check_inside(&self, key: &Key, point: [f64; 3]) -> Result<(), ArenaError> {
         (0..3).try_for_each(|axis| {
             key.index(axis).number(point[axis], self.bounds.min[axis], self.bounds.max[axis], "m, the bounds")
         })
@@ -52,7 +55,7 @@ impl ArenaFile {
         for (i, file) in self.statics.iter().enumerate() {
             let key = statics.index(i);
             file.shape.check(&key.at("shape"))?;
-            self.check_material(&key, &file.material)?;
+            self.check_material(&key.at("material"), &file.material)?;
             key.at("position").vector(file.position, WORLD_MAX)?;
             file.angles().check(&key)?;
         }
@@ -85,25 +88,21 @@ impl ArenaFile {
         Key::new("spawns").count(points, 1, THINGS_MAX, "spawn points, those of spawn_grids included")
     }
 
-    fn check_props(&self) -> Result<(), ArenaError> {
-        let mut bodies = 0;
-        for (i, prop) in self.props.iter().enumerate() {
-            let key = Key::new("props").index(i);
-            check_text(&key.at("name"), &prop.name, 32)?;
-            key.at("shape").require(prop.shape.is_bounded(), "half_space", "box, ball, capsule or cylinder")?;
-            prop.shape.check(&key.at("shape"))?;
-            self.check_material(&key, &prop.material)?;
-            key.at("mass").number(prop.mass, 0.01, 1e6, "kg")?;
-            self.check_inside(&key.at("position"), prop.position)?;
-            key.at("yaw").number(prop.yaw, -360.0, 360.0, "deg")?;
+    /// What all kinds of actors have in common; the kinds check the rest.
+    fn check_actors(&self) -> Result<(), ArenaError> {
+        let mut actors = 0;
+        for (i, file) in self.actors.iter().enumerate() {
+            let key = Key::new("actors").index(i);
+            check_text(&key.at("name"), file.name(), 32)?;
+            self.check_inside(&key.at("position"), file.position)?;
+            key.at("yaw").number(file.yaw, -360.0, 360.0, "deg")?;
             for axis in 0..3 {
-                key.at("copies").index(axis).count(prop.copies[axis], 1, THINGS_MAX, "copies")?;
-                key.at("spacing").index(axis).number(prop.spacing[axis], -1_000.0, 1_000.0, "m")?;
+                key.at("copies").index(axis).count(file.copies[axis], 1, THINGS_MAX, "copies")?;
+                key.at("spacing").index(axis).number(file.spacing[axis], -1_000.0, 1_000.0, "m")?;
             }
-            let last = [0, 1, 2].map(|axis| prop.position[axis] + (prop.copies[axis] - 1) as f64 * prop.spacing[axis]);
-            self.check_inside(&key.at("last copy"), last)?;
-            bodies += prop.copies.iter().product::<usize>();
-            key.at("copies").count(bodies, 1, THINGS_MAX, "props in all")?;
+            self.check_inside(&key.at("last copy"), file.last())?;
+            actors += file.count();
+            key.at("copies").count(actors, 1, THINGS_MAX, "actors in all")?;
         }
         Ok(())
     }
@@ -130,9 +129,11 @@ impl ArenaFile {
         Ok(())
     }
 
-    fn check_material(&self, key: &Key, name: &str) -> Result<(), ArenaError> {
+    /// # Errors
+    /// [`ArenaError::OutOfRange`] unless `name` is one of the file's materials.
+    pub fn check_material(&self, key: &Key, name: &str) -> Result<(), ArenaError> {
         let allowed = one_of("materials", self.materials.keys());
-        key.at("material").require(self.materials.contains_key(name), name, &allowed)
+        key.require(self.materials.contains_key(name), name, &allowed)
     }
 }
 

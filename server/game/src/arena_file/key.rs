@@ -53,10 +53,11 @@ impl Key {
     /// # Errors
     /// [`ArenaError::OutOfRange`] unless `ok`.
     pub fn require(&self, ok: bool, value: impl fmt::Display, allowed: &str) -> Result<(), ArenaError> {
-        if ok {
-            return Ok(());
-        }
-        let (key, value, allowed) = (self.to_string(), value.to_string(), allowed.to_owned());
-        Err(ArenaError::OutOfRange { key, value, allowed })
+        if ok { Ok(()) } else { Err(self.refuse(value, allowed)) }
+    }
+
+    /// The error that what is here is none of what is allowed.
+    pub fn refuse(&self, value: impl fmt::Display, allowed: &str) -> ArenaError {
+        ArenaError::OutOfRange { key: self.to_string(), value: value.to_string(), allowed: allowed.to_owned() }
     }
 }

@@ -44,9 +44,9 @@ pub struct ArenaFile {
     /// What everybody drives.
     #[serde(default)]
     pub vehicle: VehicleParameters,
-    /// Loose things.
+    /// Things with logic, in the order in which they are built.
     #[serde(default)]
-    pub props: Vec<PropFile>,
+    pub actors: Vec<ActorFile>,
     /// Closed routes, by name.
     #[serde(default)]
     pub routes: BTreeMap<String, RouteFile>,
@@ -138,19 +138,14 @@ pub struct SpawnGridFile {
     pub yaw: f64,
 }
 
-/// A loose thing, or a block of equal ones.
+/// An actor, or a block of equal ones.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PropFile {
-    /// What a person calls it.
-    pub name: String,
-    /// Its shape.
-    pub shape: ShapeFile,
-    /// Name of its material.
-    pub material: String,
-    /// Kg.
-    pub mass: f64,
-    /// Centre of the first, m.
+pub struct ActorFile {
+    /// Name of its kind.
+    pub kind: String,
+    /// What a person calls it; the kind where it is left out.
+    pub name: Option<String>,
+    /// Place of the first, m; what of it is there is the kind's affair.
     pub position: [f64; 3],
     /// Heading, deg to the left of +x.
     #[serde(default)]
@@ -161,6 +156,26 @@ pub struct PropFile {
     /// Distance of neighbours along x, y and z, m.
     #[serde(default)]
     pub spacing: [f64; 3],
+    /// All other keys: the kind's own.
+    #[serde(flatten)]
+    pub parameters: toml::Table,
+}
+
+impl ActorFile {
+    /// What a person calls it.
+    pub fn name(&self) -> &str {
+        self.name.as_deref().unwrap_or(&self.kind)
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.copies.iter().product()
+    }
+
+    /// Place of the last copy, m.
+    pub fn last(&self) -> [f64; 3] {
+        [0, 1, 2].map(|axis| self.position[axis] + (self.copies[axis] - 1) as f64 * self.spacing[axis])
+    }
 }
 
 fn one_of_each() -> [usize; 3] {

@@ -134,13 +134,28 @@ const BAD_ADDITIONS: &[(&str, &[&str])] = &[
     ("[vehicle]\ndrive = \"sails\"", &["unknown variant `sails`", "`rear`"]),
     ("[[spawns]]\nposition = [0, nan, 0]", &["spawns[0].position[1] is NaN", "-20 to 1000 m"]),
     (
-        "[[props]]\nname = \"x\"\nshape.half_space = {}\nmaterial = \"asphalt\"\nmass = 1\nposition = [0, 0, 0]",
-        &["props[0].shape is half_space", "box, ball, capsule or cylinder"],
+        "[[actors]]\nkind = \"prop\"\nshape.half_space = {}\nmaterial = \"asphalt\"\nmass = 1\nposition = [0, 0, 0]",
+        &["actors[0].shape is half_space", "box, ball, capsule or cylinder"],
     ),
     (
-        "[[props]]\nname = \"x\"\nshape.ball.radius = 1\nmaterial = \"asphalt\"\nmass = 1\nposition = [0, 0, 0]\ncopies = [4096, 4096, 4096]",
-        &["props[0].copies is 68719476736", "1 to 4096 props in all"],
+        "[[actors]]\nkind = \"prop\"\nshape.ball.radius = 1\nmaterial = \"asphalt\"\nmass = 1\nposition = [0, 0, 0]\ncopies = [4096, 4096, 4096]",
+        &["actors[0].copies is 68719476736", "1 to 4096 actors in all"],
     ),
+    ("[[actors]]\nkind = \"unicorn\"\nposition = [0, 0, 0]", &["actors[0].kind is unicorn", "one of", "prop"]),
+    (
+        "[[actors]]\nkind = \"prop\"\nposition = [0, 0, 0]\nshape.ball.radius = 1\nmaterial = \"asphalt\"\nmass = 1\nwings = 2",
+        &["actors[0], of kind prop", "unknown field `wings`", "mass"],
+    ),
+    (
+        "[[actors]]\nkind = \"prop\"\nposition = [0, 0, 0]\nshape.ball.radius = 1\nmaterial = \"asphalt\"\nmass = \"heavy\"",
+        &["actors[0], of kind prop", "invalid type: string \"heavy\"", "mass"],
+    ),
+    (
+        "[[actors]]\nkind = \"prop\"\nposition = [0, 0, 0]\nshape.ball.radius = 1\nmaterial = \"asphalt\"\nmass = 0",
+        &["actors[0].mass is 0", "0.01 to 1000000 kg"],
+    ),
+    ("[[actors]]\nkind = \"prop\"\nposition = [0, -99, 0]", &["actors[0].position[1] is -99", "the bounds"]),
+    ("[[actors]]\nkind = \"prop\"", &["missing field `position`"]),
     (
         "[[drivers]]\nname = \"x\"\nroute = \"moon\"\nspeed = 9",
         &["drivers[0].route is moon", "a name from [routes], which is empty"],

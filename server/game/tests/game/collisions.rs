@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use pita_game::{Actor, ActorInfo, Contact, PartInfo, Partner, Pose, Response};
+use pita_game::{Actor, ActorInfo, Contact, PartInfo, Partner, Response};
 use pita_sim::{BodyId, Collider, DVec3, Phase, RigidBodyDesc, Shape, SimError, World};
 
 use crate::test_track::{FLAT, SETTINGS, TestTrack};
@@ -32,14 +32,6 @@ impl Actor for Probe {
         let told = (phase, partner, other.material.to_owned(), normal, approach_speed, impulse);
         self.told.lock().unwrap().push(told);
         if (self.passes)(contact) { Response::Pass } else { Response::Collide }
-    }
-
-    fn home(&self) -> Option<Pose> {
-        None
-    }
-
-    fn place(&mut self, _world: &mut World, _pose: Pose) -> Result<(), SimError> {
-        Ok(())
     }
 }
 

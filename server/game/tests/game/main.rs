@@ -1,5 +1,6 @@
 //! Tests of the game through its public interface: one binary, a module a subject.
 
+mod actors;
 mod arena_files;
 mod collisions;
 mod driving;

@@ -1,0 +1,196 @@
+//! Stage 3: actors come, act, are lost and go.
+
+use pita_sim::{DVec3, SimError, World};
+
+use super::{Arena, ArenaEvent};
+use crate::actor::{Actor, WhenLost};
+use crate::spawn;
+use crate::step::{EFFECTS_MAX, LogicReport, Other, Request, Step};
+
+/// Most actors of an arena: what asks for more is refused.
+const ACTORS_MAX: usize = 16_384;
+
+impl Arena {
+    /// Lets every actor judge its collisions, sees to those who are lost, lets every actor act, in order of id, and does
+    /// what they asked for.
+    pub(crate) fn run_logic(&mut self) {
+        self.logic = LogicReport { actors: self.actors.len(), ..LogicReport::default() };
+        self.judge_collisions();
+        self.find_lost();
+        self.see_to_lost();
+        self.look_around();
+        self.step_actors();
+        self.see_to_lost();
+        self.grant_requests();
+    }
+
+    /// Whom the world lost: an actor that left the bounds, or of which the engine took a body out of the world.
+    fn find_lost(&mut self) {
+        let Self { actors, world, bounds, lost, .. } = self;
+        let is_lost = |actor: &dyn Actor| {
+            actor.bodies().iter().any(|&body| {
+                let inside = world.position(body).is_some_and(|at| bounds.contains(at));
+                !inside || world.is_quarantined(body)
+            })
+        };
+        lost.extend(actors.iter().filter(|(_, actor)| is_lost(&***actor)).map(|(&id, _)| id));
+    }
+
+    fn see_to_lost(&mut self) {
+        let mut lost = std::mem::take(&mut self.lost);
+        for id in lost.drain(..) {
+            self.put_back(id);
+        }
+        self.lost = lost;
+    }
+
+    /// Puts an actor back to where it wants to be when it is lost, or takes it away.
+    fn put_back(&mut self, id: u32) {
+        let pose = match self.actors.get(&id).map(|actor| actor.when_lost()) {
+            None => return,
+            Some(WhenLost::Remove) => {
+                self.logic.removed += 1;
+                return self.remove(id);
+            }
+            Some(WhenLost::Home(pose)) => pose,
+            Some(WhenLost::Spawn) => spawn::choose(&self.spawns, &self.positions_but(id)),
+        };
+        if let Some(actor) = self.actors.get_mut(&id) {
+            // Homes and spawn points are checked when the arena is built: the engine has no reason to refuse one.
+            let _refused = actor.place(&mut self.world, pose);
+        }
+    }
+
+    /// What actors are told of each other.
+    fn look_around(&mut self) {
+        let Self { actors, world, others, .. } = self;
+        others.clear();
+        others.extend(actors.values().filter_map(|actor| {
+            let (info, &body) = (actor.describe(), actor.bodies().first()?);
+            let (position, velocity) = (world.position(body)?, world.velocity(body)?);
+            Some(Other { id: info.id, kind: info.kind, slot: info.slot, body, position, velocity })
+        }));
+    }
+
+    fn step_actors(&mut self) {
+        let mut step = Step {
+            world: &mut self.world,
+            dt: self.dt,
+            tick: self.ticks + 1,
+            id: 0,
+            others: &self.others,
+            owners: &self.owners,
+            next_actor: &mut self.next_actor,
+            requests: &mut self.requests,
+            report: &mut self.logic,
+        };
+        for (&id, actor) in &mut self.actors {
+            step.id = id;
+            if actor.step(&mut step).is_err() {
+                self.lost.push(id);
+            }
+        }
+    }
+
+    fn grant_requests(&mut self) {
+        let mut requests = std::mem::take(&mut self.requests);
+        for request in requests.drain(..) {
+            self.grant(request);
+        }
+        self.requests = requests;
+    }
+
+    fn grant(&mut self, request: Request) {
+        let is_granted = match request {
+            Request::Add { id, build } => {
+                let is_added = self.build_actor(id, build).is_ok();
+                self.logic.added += usize::from(is_added);
+                is_added
+            }
+            Request::Remove(id) => {
+                let may_go = self.actors.get(&id).is_some_and(|actor| actor.describe().slot.is_none());
+                if may_go {
+                    self.remove(id);
+                    self.logic.removed += 1;
+                }
+                may_go
+            }
+            Request::Tell { from, to, message } => {
+                let told = self.actors.get_mut(&to).map(|actor| actor.hear(from, &message)).is_some();
+                self.logic.messages += usize::from(told);
+                told
+            }
+            Request::Effect(effect) => {
+                let is_one_of_few = self.logic.effects < EFFECTS_MAX;
+                if is_one_of_few {
+                    self.events.push(ArenaEvent::Effect(effect));
+                    self.logic.effects += 1;
+                }
+                is_one_of_few
+            }
+        };
+        self.logic.refused += usize::from(!is_granted);
+    }
+
+    /// An id that no actor of this run ever had.
+    pub(super) fn new_id(&mut self) -> u32 {
+        let id = self.next_actor;
+        self.next_actor += 1;
+        id
+    }
+
+    /// Adds an actor of a game's own: `build` is given the world, to add its bodies, and the actor's id.
+    ///
+    /// # Errors
+    /// What `build` says, or that there are too many actors; nothing is added then.
+    pub fn add_actor(
+        &mut self,
+        build: impl FnOnce(&mut World, u32) -> Result<Box<dyn Actor>, SimError>,
+    ) -> Result<u32, SimError> {
+        let id = self.new_id();
+        self.build_actor(id, build)?;
+        Ok(id)
+    }
+
+    fn build_actor(
+        &mut self,
+        id: u32,
+        build: impl FnOnce(&mut World, u32) -> Result<Box<dyn Actor>, SimError>,
+    ) -> Result<(), SimError> {
+        if self.actors.len() >= ACTORS_MAX {
+            return Err(SimError::Unusable { what: "an arena has at most 16384 actors" });
+        }
+        let before = self.world.body_count();
+        let actor = build(&mut self.world, id).inspect_err(|_| {
+            // What it added before it was refused: bodies are in the order in which they came.
+            while let Some(&body) = self.world.bodies().get(before) {
+                self.world.remove_body(body);
+            }
+        })?;
+        self.add(actor);
+        Ok(())
+    }
+
+    pub(super) fn add(&mut self, actor: Box<dyn Actor>) {
+        let info = actor.describe().clone();
+        self.owners.extend(actor.bodies().iter().map(|&body| (body, info.id)));
+        self.actors.insert(info.id, actor);
+        self.events.push(ArenaEvent::ActorAdded(info));
+    }
+
+    pub(super) fn remove(&mut self, id: u32) {
+        let Some(mut actor) = self.actors.remove(&id) else { return };
+        actor.leave(&mut self.world);
+        for body in actor.bodies() {
+            self.owners.remove(body);
+            self.world.remove_body(*body);
+        }
+        self.events.push(ArenaEvent::ActorRemoved(id));
+    }
+
+    /// Where every actor but `id` is.
+    pub(super) fn positions_but(&self, id: u32) -> Vec<DVec3> {
+        let others = self.actors.iter().filter(|(other, _)| **other != id);
+        others.filter_map(|(_, actor)| self.world.position(*actor.bodies().first()?)).collect()
+    }
+}
