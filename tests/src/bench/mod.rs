@@ -5,6 +5,7 @@
 
 mod broadphase;
 mod peers;
+mod published;
 mod solvers;
 mod tick;
 mod wire;
@@ -27,6 +28,11 @@ pub const ENTRIES: &[Entry] = &[
         name: "peers",
         measures: "ours and rapier in turn on the yardstick's scenes: ms, ratio, quality; minutes",
         run: peers::run,
+    },
+    Entry {
+        name: "published",
+        measures: "scenes that others have published figures for, theirs beside ours, at their time step and at ours",
+        run: published::run,
     },
     Entry {
         name: "solvers",
@@ -57,7 +63,7 @@ pub struct Options {
     pub ticks: Option<u32>,
     /// Threads of the engine; the entry's own number where there is none.
     pub threads: Option<usize>,
-    /// Scenes of the yardstick to measure; all of them where none is named.
+    /// Scenes to measure, of the yardstick for `peers`, families for `published`; all of them where none is named.
     pub scenes: Vec<String>,
     /// Times that everything is run, the least of which counts; the entry's own number where there is none.
     pub rounds: Option<u32>,

@@ -35,7 +35,7 @@ struct Arguments {
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=64))]
     threads: Option<u16>,
 
-    /// Scenes of the yardstick that `peers` runs, with commas between them [default: all]
+    /// Scenes that `peers` runs, or families of scenes that `published` does, with commas between them [default: all]
     #[arg(long, value_name = "SCENE", value_delimiter = ',')]
     scenes: Vec<String>,
 
