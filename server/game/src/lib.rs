@@ -1,7 +1,7 @@
 //! PITA's game: arenas and actors on the engine, and the pipeline that runs them.
 //!
 //! Owns: the five stages of a tick ([`pipeline`]), arenas and their files ([`arena`], [`arena_file`]), what acts in them
-//! ([`actor`], [`step`], [`kinds`], [`vehicle`], [`prop`], [`driver`]), and the controls that players send ([`controls`]). It may touch the
+//! ([`actor`], [`step`], [`kinds`], [`vehicle`], [`prop`], [`tornado`], [`driver`]), and the controls that players send ([`controls`]). It may touch the
 //! engine, `pita-sim`, and nothing else: no clock, no disk, no network, no randomness. What a tick needs from outside
 //! comes in through [`Ports`].
 //!
@@ -15,7 +15,9 @@ pub mod arena_file;
 pub mod assembly;
 pub mod controls;
 pub mod driver;
+pub mod free_form;
 pub mod kinds;
+pub mod particles;
 pub mod pipeline;
 pub mod prop;
 pub mod rehearsal;
@@ -23,6 +25,7 @@ pub mod scene;
 pub mod scheduler;
 pub mod spawn;
 pub mod step;
+pub mod tornado;
 pub mod vehicle;
 
 pub use actor::{Actor, ActorInfo, Contact, ContactSide, PartInfo, Partner, Response, WhenLost};

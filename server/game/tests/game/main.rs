@@ -4,6 +4,7 @@ mod actors;
 mod arena_files;
 mod collisions;
 mod driving;
+mod free_form;
 mod handling;
 mod pipeline;
 mod players;

@@ -45,8 +45,9 @@ impl RestShape {
         require(self.bend.abs() <= STEEPEST, "bend of the rest shape", self.bend, "-100 to 100 rad/m")
     }
 
-    /// Where a point goes, both from the lower end of the axis, m.
-    pub(super) fn map(&self, point: DVec3) -> DVec3 {
+    /// Where a point goes, both from the lower end of the axis, m: what a lattice is pulled to, and a free-form deformation
+    /// of points by itself.
+    pub fn map(&self, point: DVec3) -> DVec3 {
         let stretched = self.scale * point;
         let height = stretched.y;
         let twisted = DMat3::from_rotation_y(self.twist * height) * stretched;

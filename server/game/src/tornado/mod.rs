@@ -1,0 +1,218 @@
+//! The talk's worked example: a tornado that travels around the level, picks up what it meets and swirls it around, spins
+//! and warps, appears and disappears, and spawns dust.
+//!
+//! Owns the logic, one function for each line of the slide "Code: Loop". What it is made of are [`column`]'s spheres, where
+//! it goes is [`path`]'s, whom it holds are [`victims`]', how it swirls them is [`vortex`]'s, how it looks is [`mesh`]'s,
+//! whether it is there is [`life`]'s. It pushes on its own spheres and dust, and on its victims, through controllers alone.
+
+mod column;
+pub mod life;
+pub mod mesh;
+pub mod parameters;
+mod path;
+mod victims;
+mod vortex;
+
+use glam::{DQuat, DVec3};
+use pita_sim::{BodyId, Phase, Shape, SimError, World};
+
+use crate::Pose;
+use crate::actor::{Actor, ActorInfo, Contact, PartInfo, Partner, Response, WhenLost};
+use crate::particles::Particles;
+use crate::step::Step;
+use column::Column;
+use life::Life;
+use mesh::{Funnel, Warping};
+pub use parameters::TornadoParameters;
+use path::Path;
+use victims::Victims;
+use vortex::Vortex;
+
+/// What it is called in arena files, and by other actors.
+pub const KIND: &str = "tornado";
+
+/// Weaker than this it takes hold of nobody, and holds nobody.
+const LEAST_STRENGTH: f64 = 0.3;
+
+/// Particles of dust that are spawned at a time.
+const DUST_AT_A_TIME: usize = 3;
+
+/// Turn from each particle of dust to the next about the foot, rad: the golden angle, which never comes round.
+const DUST_ANGLE: f64 = 2.399_963;
+
+/// After this time 1/e of the difference between dust and flow is left, s.
+const DUST_GRIP: f64 = 0.15;
+
+/// Size at which a particle of dust is drawn, m.
+const DUST_RADIUS: f64 = 0.08;
+
+/// A tornado.
+pub struct Tornado {
+    info: ActorInfo,
+    parameters: TornadoParameters,
+    bodies: Vec<BodyId>,
+    column: Column,
+    path: Path,
+    life: Life,
+    warping: Warping,
+    victims: Victims,
+    dust: Particles,
+    dust_angle: f64,
+    /// What the collision procedure saw since the last step.
+    touches_ground: bool,
+    seen: Vec<BodyId>,
+}
+
+impl Tornado {
+    /// Adds the tornado to `world`, at the end of its path's last leg.
+    ///
+    /// # Errors
+    /// What the engine says where it refuses a body or a controller.
+    pub fn add(world: &mut World, id: u32, name: String, parameters: TornadoParameters) -> Result<Self, SimError> {
+        let start = parameters.legs.last().map_or(DVec3::ZERO, |leg| DVec3::from_array(leg.to));
+        let column = Column::add(world, &parameters, start)?;
+        let path = Path::add(world, column.foot(), &parameters.legs, parameters.path_acceleration)?;
+        // Out of sight, below the ground.
+        let dust = Particles::add(world, parameters.dust, DUST_GRIP, start - DVec3::Y)?;
+        let bodies: Vec<_> = column.bodies().iter().copied().chain(dust.bodies()).collect();
+        let grain = Shape::Ball { radius: DUST_RADIUS };
+        let shapes = column.shapes().iter().chain(std::iter::repeat(&grain));
+        let part = |(&body, shape): (&BodyId, &Shape)| PartInfo {
+            slice: world.serial(body).unwrap_or_default(),
+            shape: shape.clone(),
+        };
+        let parts = bodies.iter().zip(shapes).map(part).collect();
+        Ok(Self {
+            info: ActorInfo { id, kind: KIND, name, slot: None, parts },
+            life: Life::new(parameters.lifespan()),
+            warping: Warping::new(&parameters)?,
+            victims: Victims::default(),
+            dust_angle: 0.0,
+            touches_ground: false,
+            seen: Vec::with_capacity(parameters.victims),
+            bodies,
+            column,
+            path,
+            dust,
+            parameters,
+        })
+    }
+
+    /// How it stands, spins and is warped.
+    pub fn funnel(&self) -> &Funnel {
+        self.warping.funnel()
+    }
+
+    /// How many victims it holds.
+    pub fn victims(&self) -> usize {
+        self.victims.count()
+    }
+
+    /// The flow about it in this tick.
+    fn vortex(&self, world: &World) -> Result<Vortex<'_>, SimError> {
+        let spheres = self.column.spheres(world)?;
+        Ok(Vortex::new(&self.parameters, spheres, world.settings().gravity, self.life.strength()))
+    }
+
+    /// Moves it along its path, and lets it come and go.
+    fn update_forces(&mut self, step: &mut Step) -> Result<(), SimError> {
+        match self.life.pass(step.dt) {
+            Some(life::Phase::Appearing) => {
+                self.path.go_on(step.world, self.column.foot())?;
+                self.column.place(step.world, self.path.target())?;
+            }
+            Some(life::Phase::Away) => self.victims.drop_all(step.world, self.parameters.peace_time),
+            _ => {}
+        }
+        self.column.push(step.world, &mut self.path, step.dt)
+    }
+
+    /// Spins and warps its mesh.
+    fn update_warp(&mut self, step: &Step) -> Result<(), SimError> {
+        let spheres = self.column.spheres(step.world)?;
+        self.warping.step(&self.parameters, spheres, self.life.strength(), step.dt);
+        Ok(())
+    }
+
+    /// Takes hold of those that the collision procedure saw, and swirls those that it holds.
+    fn update_victims(&mut self, step: &mut Step) -> Result<(), SimError> {
+        let is_looking = step.is_due(self.parameters.sense_period) && self.life.strength() >= LEAST_STRENGTH;
+        for seen in self.seen.drain(..) {
+            if let Some(victim) = step.owner(seen).filter(|_| is_looking) {
+                self.victims.add(step.world, &self.parameters, victim.body)?;
+            }
+        }
+        let spheres = self.column.spheres(step.world)?;
+        let (gravity, strength) = (step.world.settings().gravity, self.life.strength());
+        let vortex = Vortex::new(&self.parameters, spheres, gravity, strength);
+        self.victims.swirl(step.world, &self.parameters, &vortex, step.dt)
+    }
+
+    /// Spawns dust where it touches the ground, and swirls it.
+    fn update_fx(&mut self, step: &mut Step) -> Result<(), SimError> {
+        let p = &self.parameters;
+        let vortex = self.vortex(step.world)?;
+        let passed = step.dt * f64::from(p.fx_period);
+        let spawns = if self.touches_ground && self.life.strength() >= LEAST_STRENGTH { DUST_AT_A_TIME } else { 0 };
+        let foot = self.column.spheres(step.world)?[0].0;
+        let flow = |at: DVec3| vortex.target(at, DUST_GRIP);
+        self.dust.steer(step.world, passed, flow)?;
+        for _ in 0..spawns {
+            self.dust_angle = (self.dust_angle + DUST_ANGLE).rem_euclid(std::f64::consts::TAU);
+            let at = foot + DQuat::from_rotation_y(self.dust_angle) * DVec3::X * p.foot_radius;
+            self.dust.spawn(step.world, at, flow(at), p.dust_life)?;
+        }
+        Ok(())
+    }
+
+    fn is_valid_victim(&self, contact: &Contact) -> bool {
+        let is_other_thing = matches!(contact.partner, Partner::Actor { kind, .. } if kind != KIND);
+        is_other_thing && !contact.other.is_sensor && contact.phase != Phase::End
+    }
+}
+
+impl Actor for Tornado {
+    fn describe(&self) -> &ActorInfo {
+        &self.info
+    }
+
+    /// The spheres, foot first, then the dust.
+    fn bodies(&self) -> &[BodyId] {
+        &self.bodies
+    }
+
+    fn collide(&mut self, contact: &Contact) -> Response {
+        let is_ground = matches!(contact.partner, Partner::Ground(_));
+        if is_ground && contact.own.body == Some(self.column.foot()) {
+            self.touches_ground = contact.phase != Phase::End;
+        }
+        if self.is_valid_victim(contact) && self.seen.len() < self.seen.capacity() {
+            self.seen.extend(contact.other.body);
+        }
+        Response::Pass
+    }
+
+    fn step(&mut self, step: &mut Step) -> Result<(), SimError> {
+        self.update_forces(step)?;
+        self.update_warp(step)?;
+        self.update_victims(step)?;
+        if step.is_due(self.parameters.fx_period) {
+            self.update_fx(step)?;
+        }
+        Ok(())
+    }
+
+    fn when_lost(&self) -> WhenLost {
+        WhenLost::Home(Pose { position: self.path.target(), yaw: 0.0 })
+    }
+
+    fn place(&mut self, world: &mut World, pose: Pose) -> Result<(), SimError> {
+        self.victims.drop_all(world, self.parameters.peace_time);
+        self.column.place(world, pose.position)?;
+        self.dust.park(world)
+    }
+
+    fn leave(&mut self, world: &mut World) {
+        self.victims.drop_all(world, self.parameters.peace_time);
+    }
+}
