@@ -13,6 +13,7 @@ use crate::actor::{Actor, ActorInfo, PartInfo};
 use crate::arena_file::{ActorFile, ArenaError, ArenaFile, Key, Materials};
 use crate::prop::Prop;
 use crate::spawn::Pose;
+use crate::tornado::Tornado;
 
 /// An actor that arena files can place.
 pub trait ActorKind: Actor + Sized + 'static {
@@ -80,7 +81,7 @@ impl ActorKinds {
 
     /// The kinds that come with the game.
     pub fn built_in() -> Self {
-        Self::none().with::<Prop>()
+        Self::none().with::<Prop>().with::<Tornado>()
     }
 
     /// These kinds and `K`, which takes the place of one that has its name.

@@ -4,9 +4,7 @@
 //! after the pool: what is not in use sleeps where it is parked and costs a tick nothing. Particles touch nothing.
 
 use glam::DVec3;
-use pita_sim::{
-    Anchor, BodyId, DQuat, JointDrive, ParticleDesc, PdControl, PdDesc, PdId, SimError, World,
-};
+use pita_sim::{Anchor, BodyId, DQuat, JointDrive, ParticleDesc, PdControl, PdDesc, PdId, SimError, World};
 
 /// What weighs nothing to speak of, kg: nothing feels it, its motion is its velocity potential's.
 const MASS: f64 = 0.01;
@@ -55,18 +53,14 @@ impl Particles {
         self.pool.iter().map(|particle| particle.body)
     }
 
-    /// How many are in use.
-    pub fn living(&self) -> usize {
-        self.pool.iter().filter(|particle| particle.left > 0.0).count()
-    }
-
     /// A particle at `position`, m, with `velocity`, m/s, for `life` s: one that is parked, or the one that was used first.
     ///
     /// # Errors
     /// What the engine says.
     pub fn spawn(&mut self, world: &mut World, position: DVec3, velocity: DVec3, life: f64) -> Result<(), SimError> {
+        let count = self.pool.len();
         let Some(particle) = self.pool.get_mut(self.oldest) else { return Ok(()) };
-        self.oldest = (self.oldest + 1) % self.pool.len();
+        self.oldest = (self.oldest + 1) % count;
         particle.left = life;
         world.set_pose(particle.body, position, DQuat::IDENTITY)?;
         world.set_velocity(particle.body, velocity, DVec3::ZERO)
@@ -84,11 +78,27 @@ impl Particles {
             if particle.left > 0.0 {
                 world.set_pd(particle.flow, PdControl { target: at, target_velocity: flow(at) })?;
             } else {
-                world.set_pose(particle.body, self.parked, DQuat::IDENTITY)?;
-                world.set_velocity(particle.body, DVec3::ZERO, DVec3::ZERO)?;
-                world.sleep(particle.body)?;
+                park(world, particle.body, self.parked)?;
             }
         }
         Ok(())
     }
+
+    /// Parks all of them.
+    ///
+    /// # Errors
+    /// What the engine says.
+    pub fn park(&mut self, world: &mut World) -> Result<(), SimError> {
+        for particle in &mut self.pool {
+            particle.left = 0.0;
+            park(world, particle.body, self.parked)?;
+        }
+        Ok(())
+    }
+}
+
+fn park(world: &mut World, body: BodyId, at: DVec3) -> Result<(), SimError> {
+    world.set_pose(body, at, DQuat::IDENTITY)?;
+    world.set_velocity(body, DVec3::ZERO, DVec3::ZERO)?;
+    world.sleep(body)
 }

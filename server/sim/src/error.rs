@@ -47,7 +47,7 @@ pub enum SimError {
 
 impl SimError {
     /// The same, said of `item`.
-    pub(crate) fn of(self, item: impl Into<String>) -> Self {
+    pub fn of(self, item: impl Into<String>) -> Self {
         Self::Named { item: item.into(), reason: Box::new(self) }
     }
 }

@@ -14,7 +14,7 @@ use glam::{DQuat, DVec3};
 use pita_sim::{RestShape, Shape};
 
 pub use key_frames::{KEYS_MAX, KeyFrames};
-pub use warp::Warp;
+pub use warp::{Appearance, Warp};
 
 /// What a deformation goes along.
 #[derive(Clone, Copy, Debug, PartialEq)]

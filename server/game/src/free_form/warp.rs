@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec2, DVec3};
 use pita_sim::{RestShape, SimError};
 
-use super::{Axis, FreeForm};
+use super::{Axis, FreeForm, deform};
 
 /// A deformation about a vertical axis: its own degrees of freedom. It is nowhere singular, so that numbers between two
 /// warps are a warp between them.
@@ -64,5 +64,30 @@ impl Warp {
 impl Default for Warp {
     fn default() -> Self {
         Self::NONE
+    }
+}
+
+/// How what is drawn of an actor is turned and deformed: with the place of its first part, all that is needed to draw it
+/// from its mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Appearance {
+    /// Turn of the whole about its vertical axis, 0 to 2π.
+    pub spin: f64,
+    /// Its free-form deformation.
+    pub warp: Warp,
+    /// 0 where it is not there, 1 in full strength.
+    pub strength: f64,
+}
+
+impl Appearance {
+    /// As its mesh is.
+    pub const PLAIN: Self = Self { spin: 0.0, warp: Warp::NONE, strength: 1.0 };
+
+    /// Turns and deforms points of the mesh in place, and puts its origin to `base`, m.
+    pub fn deform(&self, base: DVec3, points: &mut [DVec3]) {
+        let spin = DQuat::from_rotation_y(self.spin);
+        points.iter_mut().for_each(|point| *point = spin * *point);
+        deform(&self.warp.free_form(DVec3::ZERO), points);
+        points.iter_mut().for_each(|point| *point += base);
     }
 }

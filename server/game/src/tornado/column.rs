@@ -2,9 +2,7 @@
 //! above the other, each with a sphere that sees and does not push.
 
 use glam::{DQuat, DVec3};
-use pita_sim::{
-    Anchor, BodyId, Collider, JointDrive, ParticleDesc, PdControl, PdDesc, PdId, Shape, SimError, World,
-};
+use pita_sim::{Anchor, BodyId, Collider, JointDrive, ParticleDesc, PdControl, PdDesc, PdId, Shape, SimError, World};
 
 use super::TornadoParameters;
 use super::path::Path;

@@ -92,7 +92,8 @@ mod tests {
         use Phase::{Appearing, Away, Disappearing, Roaming};
         assert_eq!(begun, [Roaming, Disappearing, Away, Appearing, Roaming]);
         let mut stays = Life::new(Lifespan { fade_time: 0.5, stay_time: 1.0, away_time: 0.0 });
-        (0..1000).for_each(|_| drop(stays.pass(dt)));
+        let begun: Vec<_> = (0..1000).filter_map(|_| stays.pass(dt)).collect();
+        assert_eq!(begun, [Roaming]);
         assert_eq!((stays.phase(), stays.strength()), (Roaming, 1.0));
     }
 }

@@ -7,7 +7,7 @@ use pita_sim::SimError;
 
 use super::TornadoParameters;
 use super::column::Column;
-use crate::free_form::{KeyFrames, Warp, deform};
+use crate::free_form::{Appearance, KeyFrames, Warp};
 
 /// Rings of the funnel's mesh, from foot to top.
 pub const RINGS: usize = 12;
@@ -19,29 +19,6 @@ const BENT_MAX: f64 = 1.2;
 
 /// Least share of its size that a tornado which is not there is drawn with.
 const LEAST: f64 = 0.1;
-
-/// How the funnel stands, spins and is warped: all that is needed to draw it from its mesh.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Funnel {
-    /// Foot of its axis, m.
-    pub base: DVec3,
-    /// Turn of the whole about its axis, 0 to 2π.
-    pub spin: f64,
-    /// Its free-form deformation.
-    pub warp: Warp,
-    /// 0 where it is not there, 1 in full strength.
-    pub strength: f64,
-}
-
-impl Funnel {
-    /// Deforms points of the mesh in place, so that they are in the world.
-    pub fn deform(&self, points: &mut [DVec3]) {
-        let spin = DQuat::from_rotation_y(self.spin);
-        points.iter_mut().for_each(|point| *point = spin * *point);
-        deform(&self.warp.free_form(DVec3::ZERO), points);
-        points.iter_mut().for_each(|point| *point += self.base);
-    }
-}
 
 /// Points of the mesh before it is warped, ring by ring from the foot, m.
 pub fn mesh(p: &TornadoParameters) -> Vec<DVec3> {
@@ -59,7 +36,7 @@ pub struct Warping {
     keys: Option<KeyFrames<{ Warp::NUMBERS }>>,
     /// Since it appeared first, s.
     time: f64,
-    funnel: Funnel,
+    shown: Appearance,
 }
 
 impl Warping {
@@ -70,24 +47,17 @@ impl Warping {
     pub fn new(p: &TornadoParameters) -> Result<Self, SimError> {
         let keys: Vec<_> = p.warp.iter().map(|frame| frame.key()).collect();
         let keys = if keys.is_empty() { None } else { Some(KeyFrames::new(keys, Some(p.warp_period))?) };
-        let funnel = Funnel { base: DVec3::ZERO, spin: 0.0, warp: Warp::NONE, strength: 0.0 };
-        Ok(Self { keys, time: 0.0, funnel })
+        Ok(Self { keys, time: 0.0, shown: Appearance { strength: 0.0, ..Appearance::PLAIN } })
     }
 
     /// As of this tick.
-    pub fn funnel(&self) -> &Funnel {
-        &self.funnel
+    pub fn shown(&self) -> Appearance {
+        self.shown
     }
 
     /// Lets `dt` pass. What is key-framed comes on top of what the column's motion does by itself: its spacing stretches
     /// the funnel, its lean bends it, its strength scales it.
-    pub fn step(
-        &mut self,
-        p: &TornadoParameters,
-        spheres: [(DVec3, DVec3); Column::SPHERES],
-        strength: f64,
-        dt: f64,
-    ) {
+    pub fn step(&mut self, p: &TornadoParameters, spheres: [(DVec3, DVec3); Column::SPHERES], strength: f64, dt: f64) {
         self.time += dt;
         let [(foot, _), .., (top, _)] = spheres;
         let height = (top.y - foot.y).max(LEAST * p.height);
@@ -100,9 +70,8 @@ impl Warping {
             bend: lean.clamp_length_max(BENT_MAX / height),
         };
         let keyed = self.keys.as_ref().map_or(Warp::NONE, |keys| Warp::of_numbers(keys.at(self.time)));
-        self.funnel = Funnel {
-            base: foot,
-            spin: (self.funnel.spin + p.spin_speed * dt).rem_euclid(TAU),
+        self.shown = Appearance {
+            spin: (self.shown.spin + p.spin_speed * dt).rem_euclid(TAU),
             warp: moved.with(&keyed),
             strength,
         };

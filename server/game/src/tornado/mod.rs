@@ -18,18 +18,18 @@ use pita_sim::{BodyId, Phase, Shape, SimError, World};
 
 use crate::Pose;
 use crate::actor::{Actor, ActorInfo, Contact, PartInfo, Partner, Response, WhenLost};
+use crate::arena_file::{ArenaError, ArenaFile, Key};
+use crate::free_form::Appearance;
+use crate::kinds::{ActorKind, Site};
 use crate::particles::Particles;
 use crate::step::Step;
 use column::Column;
 use life::Life;
-use mesh::{Funnel, Warping};
+use mesh::Warping;
 pub use parameters::TornadoParameters;
 use path::Path;
 use victims::Victims;
 use vortex::Vortex;
-
-/// What it is called in arena files, and by other actors.
-pub const KIND: &str = "tornado";
 
 /// Weaker than this it takes hold of nobody, and holds nobody.
 const LEAST_STRENGTH: f64 = 0.3;
@@ -63,57 +63,47 @@ pub struct Tornado {
     seen: Vec<BodyId>,
 }
 
-impl Tornado {
-    /// Adds the tornado to `world`, at the end of its path's last leg.
-    ///
-    /// # Errors
-    /// What the engine says where it refuses a body or a controller.
-    pub fn add(world: &mut World, id: u32, name: String, parameters: TornadoParameters) -> Result<Self, SimError> {
-        let start = parameters.legs.last().map_or(DVec3::ZERO, |leg| DVec3::from_array(leg.to));
-        let column = Column::add(world, &parameters, start)?;
-        let path = Path::add(world, column.foot(), &parameters.legs, parameters.path_acceleration)?;
+impl ActorKind for Tornado {
+    const KIND: &'static str = "tornado";
+    type Parameters = TornadoParameters;
+
+    fn check(parameters: &TornadoParameters, key: &Key, file: &ArenaFile) -> Result<(), ArenaError> {
+        parameters.check(key, file)
+    }
+
+    /// Its foot is at the place that the file gives it, and goes to the end of the first leg from there.
+    fn add(site: &mut Site, parameters: &TornadoParameters) -> Result<Self, SimError> {
+        let (start, p) = (site.pose.position, parameters);
+        let column = Column::add(site.world, p, start)?;
+        let path = Path::add(site.world, column.foot(), &p.legs, p.path_acceleration)?;
         // Out of sight, below the ground.
-        let dust = Particles::add(world, parameters.dust, DUST_GRIP, start - DVec3::Y)?;
+        let dust = Particles::add(site.world, p.dust, DUST_GRIP, start - DVec3::Y)?;
         let bodies: Vec<_> = column.bodies().iter().copied().chain(dust.bodies()).collect();
         let grain = Shape::Ball { radius: DUST_RADIUS };
         let shapes = column.shapes().iter().chain(std::iter::repeat(&grain));
         let part = |(&body, shape): (&BodyId, &Shape)| PartInfo {
-            slice: world.serial(body).unwrap_or_default(),
+            slice: site.world.serial(body).unwrap_or_default(),
             shape: shape.clone(),
         };
         let parts = bodies.iter().zip(shapes).map(part).collect();
         Ok(Self {
-            info: ActorInfo { id, kind: KIND, name, slot: None, parts },
-            life: Life::new(parameters.lifespan()),
-            warping: Warping::new(&parameters)?,
+            info: site.info(Self::KIND, parts),
+            life: Life::new(p.lifespan()),
+            warping: Warping::new(p)?,
             victims: Victims::default(),
             dust_angle: 0.0,
             touches_ground: false,
-            seen: Vec::with_capacity(parameters.victims),
+            seen: Vec::with_capacity(p.victims),
             bodies,
             column,
             path,
             dust,
-            parameters,
+            parameters: p.clone(),
         })
     }
+}
 
-    /// How it stands, spins and is warped.
-    pub fn funnel(&self) -> &Funnel {
-        self.warping.funnel()
-    }
-
-    /// How many victims it holds.
-    pub fn victims(&self) -> usize {
-        self.victims.count()
-    }
-
-    /// The flow about it in this tick.
-    fn vortex(&self, world: &World) -> Result<Vortex<'_>, SimError> {
-        let spheres = self.column.spheres(world)?;
-        Ok(Vortex::new(&self.parameters, spheres, world.settings().gravity, self.life.strength()))
-    }
-
+impl Tornado {
     /// Moves it along its path, and lets it come and go.
     fn update_forces(&mut self, step: &mut Step) -> Result<(), SimError> {
         match self.life.pass(step.dt) {
@@ -142,31 +132,28 @@ impl Tornado {
                 self.victims.add(step.world, &self.parameters, victim.body)?;
             }
         }
-        let spheres = self.column.spheres(step.world)?;
-        let (gravity, strength) = (step.world.settings().gravity, self.life.strength());
-        let vortex = Vortex::new(&self.parameters, spheres, gravity, strength);
+        let vortex = Vortex::about(&self.column, step.world, &self.parameters, self.life.strength())?;
         self.victims.swirl(step.world, &self.parameters, &vortex, step.dt)
     }
 
     /// Spawns dust where it touches the ground, and swirls it.
     fn update_fx(&mut self, step: &mut Step) -> Result<(), SimError> {
         let p = &self.parameters;
-        let vortex = self.vortex(step.world)?;
+        let vortex = Vortex::about(&self.column, step.world, p, self.life.strength())?;
         let passed = step.dt * f64::from(p.fx_period);
         let spawns = if self.touches_ground && self.life.strength() >= LEAST_STRENGTH { DUST_AT_A_TIME } else { 0 };
-        let foot = self.column.spheres(step.world)?[0].0;
         let flow = |at: DVec3| vortex.target(at, DUST_GRIP);
         self.dust.steer(step.world, passed, flow)?;
         for _ in 0..spawns {
             self.dust_angle = (self.dust_angle + DUST_ANGLE).rem_euclid(std::f64::consts::TAU);
-            let at = foot + DQuat::from_rotation_y(self.dust_angle) * DVec3::X * p.foot_radius;
+            let at = vortex.foot() + DQuat::from_rotation_y(self.dust_angle) * DVec3::X * p.foot_radius;
             self.dust.spawn(step.world, at, flow(at), p.dust_life)?;
         }
         Ok(())
     }
 
     fn is_valid_victim(&self, contact: &Contact) -> bool {
-        let is_other_thing = matches!(contact.partner, Partner::Actor { kind, .. } if kind != KIND);
+        let is_other_thing = matches!(contact.partner, Partner::Actor { kind, .. } if kind != Self::KIND);
         is_other_thing && !contact.other.is_sensor && contact.phase != Phase::End
     }
 }
@@ -200,6 +187,10 @@ impl Actor for Tornado {
             self.update_fx(step)?;
         }
         Ok(())
+    }
+
+    fn appearance(&self) -> Appearance {
+        self.warping.shown()
     }
 
     fn when_lost(&self) -> WhenLost {

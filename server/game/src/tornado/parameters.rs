@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use super::life::Lifespan;
-use crate::arena_file::{ArenaError, Key};
+use crate::arena_file::{ArenaError, ArenaFile, Key};
 use crate::free_form::{KEYS_MAX, Warp};
 
 /// Most legs of a path.
@@ -158,7 +158,7 @@ impl TornadoParameters {
 
     /// # Errors
     /// [`ArenaError::OutOfRange`] for the first value that is not allowed; `key` is where the table is.
-    pub fn check(&self, key: &Key) -> Result<(), ArenaError> {
+    pub fn check(&self, key: &Key, file: &ArenaFile) -> Result<(), ArenaError> {
         let number = |name: &str, value, min, max, unit| key.at(name).number(value, min, max, unit);
         number("height", self.height, 2.0, 200.0, "m")?;
         number("foot_radius", self.foot_radius, 0.5, 50.0, "m")?;
@@ -183,15 +183,15 @@ impl TornadoParameters {
         key.at("dust").count(self.dust, 0, 256, "particles")?;
         number("dust_life", self.dust_life, 0.1, 10.0, "s")?;
         key.at("fx_period").count(self.fx_period as usize, 1, 300, "ticks")?;
-        self.check_legs(&key.at("legs"))?;
+        self.check_legs(&key.at("legs"), file)?;
         self.check_warp(key)
     }
 
-    fn check_legs(&self, key: &Key) -> Result<(), ArenaError> {
+    fn check_legs(&self, key: &Key, file: &ArenaFile) -> Result<(), ArenaError> {
         key.count(self.legs.len(), 1, LEGS_MAX, "legs")?;
         for (i, leg) in self.legs.iter().enumerate() {
             let key = key.index(i);
-            key.at("to").vector(leg.to, 5_000.0)?;
+            file.check_inside(&key.at("to"), leg.to)?;
             key.at("frequency").number(leg.frequency, 0.005, 2.0, "Hz")?;
             key.at("damping_ratio").number(leg.damping_ratio, 0.3, 5.0, "")?;
             key.at("wait").number(leg.wait, 0.0, 600.0, "s")?;

@@ -28,11 +28,6 @@ struct Victim {
 }
 
 impl Victims {
-    /// How many it holds.
-    pub fn count(&self) -> usize {
-        self.held.len()
-    }
-
     /// Takes hold of a body, unless it has it, has just dropped it, has its hands full, or it is too heavy. Answers
     /// whether it did.
     ///
@@ -76,7 +71,7 @@ impl Victims {
             victim.held += dt;
             let Some(at) = world.position(victim.body) else { continue };
             let had_enough = victim.held > p.hold_time || vortex.share(at) > 1.0;
-            if had_enough || vortex.from_axis(at).length() > torn_off || world.is_quarantined(victim.body) {
+            if had_enough || vortex.arm(at).length() > torn_off || world.is_quarantined(victim.body) {
                 self.drop_one(world, i, p.peace_time);
                 continue;
             }

@@ -1,6 +1,7 @@
 //! The flow of a tornado: which velocity it wants to give to what is at a place.
 
 use glam::DVec3;
+use pita_sim::{SimError, World};
 
 use super::TornadoParameters;
 use super::column::Column;
@@ -19,14 +20,22 @@ pub struct Vortex<'a> {
 const DRAW: f64 = 0.6;
 
 impl<'a> Vortex<'a> {
-    /// The flow about spheres with these places and velocities.
-    pub fn new(
+    /// The flow about a column as it stands.
+    ///
+    /// # Errors
+    /// Where a sphere of the column is gone.
+    pub fn about(
+        column: &Column,
+        world: &World,
         parameters: &'a TornadoParameters,
-        spheres: [(DVec3, DVec3); Column::SPHERES],
-        gravity: DVec3,
         strength: f64,
-    ) -> Self {
-        Self { parameters, spheres, gravity, strength }
+    ) -> Result<Self, SimError> {
+        Ok(Self { parameters, spheres: column.spheres(world)?, gravity: world.settings().gravity, strength })
+    }
+
+    /// Where it stands on the ground, m.
+    pub fn foot(&self) -> DVec3 {
+        self.spheres[0].0
     }
 
     /// How high a place is between foot, 0, and top, 1.
@@ -36,7 +45,7 @@ impl<'a> Vortex<'a> {
     }
 
     /// Horizontally from the axis to a place, m.
-    pub fn from_axis(&self, point: DVec3) -> DVec3 {
+    pub fn arm(&self, point: DVec3) -> DVec3 {
         (point - self.axis(self.share(point)).0).with_y(0.0)
     }
 
@@ -56,7 +65,7 @@ impl<'a> Vortex<'a> {
 
     /// Velocity that the flow wants at a place, m/s: around, towards the orbit, and up.
     fn wanted(&self, point: DVec3) -> DVec3 {
-        let (p, share, arm) = (self.parameters, self.share(point), self.from_axis(point));
+        let (p, share, arm) = (self.parameters, self.share(point), self.arm(point));
         let outwards = arm.try_normalize().unwrap_or(DVec3::X);
         let around = self.strength * p.swirl_speed;
         let missing = (self.radius(share) - arm.length()) / p.grip;
@@ -68,7 +77,7 @@ impl<'a> Vortex<'a> {
     /// What a velocity potential has to aim at, m/s, so that it arrives at the flow: it stays behind by its time constant
     /// times the acceleration that it has to give, that of the orbit and gravity's.
     pub fn target(&self, point: DVec3, time_constant: f64) -> DVec3 {
-        let (p, arm) = (self.parameters, self.from_axis(point));
+        let (p, arm) = (self.parameters, self.arm(point));
         let around = self.strength * p.swirl_speed;
         let radius = arm.length().max(0.5 * self.radius(self.share(point)));
         let inwards = -arm.normalize_or_zero() * around * around / radius;

@@ -11,3 +11,4 @@ mod players;
 mod rehearsals;
 mod reproducibility;
 mod test_track;
+mod tornado;

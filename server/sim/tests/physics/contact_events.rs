@@ -1,8 +1,8 @@
 //! Collisions as logic sees them: groups, sensors, phases, what may pass, and materials.
 
 use pita_sim::{
-    BodyId, Collider, Collision, CollisionObject, DVec3, Groups, Material, MaterialId, Phase, RigidBodyDesc, Shape,
-    StaticDesc, Surface, World,
+    BodyId, Collider, Collision, CollisionObject, DQuat, DVec3, Groups, Material, MaterialId, ParticleDesc, Phase,
+    RigidBodyDesc, Shape, StaticDesc, Surface, World,
 };
 
 use super::{DT, body, ground, weightless, world};
@@ -110,6 +110,35 @@ fn a_sensor_sees_what_passes_and_pushes_nothing() {
     assert_eq!((count(Phase::Begin), count(Phase::End)), (1, 1));
     // Two metres at 3 m/s, in ticks.
     assert!((19..=21).contains(&count(Phase::Stay)), "{}", count(Phase::Stay));
+}
+
+/// Nor does it wake what sleeps: whoever has the sensor is told of it and decides.
+#[test]
+fn a_sensor_sees_what_sleeps() {
+    let mut world = world();
+    ground(&mut world);
+    let shape = Shape::Box { half: DVec3::new(1.0, 0.25, 0.5) };
+    let sleeper = body(&mut world, shape, 100.0, DVec3::Y * 0.25, 0.5);
+    while !world.is_asleep(sleeper) {
+        world.step();
+    }
+    let sensor = Collider::new(Shape::Ball { radius: 3.0 }, 0.5).into_sensor();
+    let position = DVec3::X * -10.0;
+    let eye = world
+        .add_particle(ParticleDesc { position, velocity: DVec3::X * 6.0, mass: 1.0, collider: Some(sensor) })
+        .unwrap();
+    let mut seen = 0;
+    for _ in 0..100 {
+        let at = world.position(eye).unwrap().with_y(0.0);
+        world.set_pose(eye, at, DQuat::IDENTITY).unwrap();
+        world.set_velocity(eye, DVec3::X * 6.0, DVec3::ZERO).unwrap();
+        world.detect_collisions();
+        let sees = world.collisions().any(|c| c.sides.iter().any(|side| side.object == CollisionObject::Body(sleeper)));
+        assert_eq!(sees, at.x.abs() < 4.0 && at.x.abs() < 3.9 || sees && at.x.abs() < 4.3, "{at}");
+        seen += usize::from(sees);
+        world.integrate();
+    }
+    assert!(seen > 30 && world.is_asleep(sleeper), "{seen}");
 }
 
 #[test]

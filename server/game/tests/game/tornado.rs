@@ -1,0 +1,191 @@
+//! The tornado: whom it picks up, how high, and how they come down; its path, its dust, its mesh.
+
+use pita_game::tornado::{TornadoParameters, mesh};
+use pita_game::{ActorInfo, Arena, ArenaSettings, Controls};
+use pita_sim::DVec3;
+
+use crate::test_track::{FLAT, SETTINGS, TestTrack};
+
+/// Crates that it goes over on its way from x = −30 to 30, and some that are asleep.
+const CRATES: &str = r#"
+[materials.wood]
+friction = 0.4
+
+[[actors]]
+kind = "prop"
+name = "crate"
+shape.box.half = [0.4, 0.4, 0.4]
+material = "wood"
+mass = 20.0
+position = [-10.0, 0.4, -2.0]
+copies = [4, 1, 3]
+spacing = [2.0, 0.0, 2.0]
+"#;
+
+/// A tornado that goes to and fro between x = −30 and 30 at a height, with more keys.
+fn tornado(height: f64, keys: &str) -> String {
+    let legs = [30.0, -30.0].map(|x| format!("{{ to = [{x:.1}, {height:.1}, 0.0], frequency = 0.06 }}"));
+    format!(
+        "[[actors]]\nkind = \"tornado\"\nname = \"twister\"\nposition = [-30.0, {height:.1}, 0.0]\nlegs = [{}]\n{keys}\n",
+        legs.join(", ")
+    )
+}
+
+/// One that stays.
+const STAYS: &str = "away_time = 0.0";
+
+fn named(track: &TestTrack, name: &str) -> Vec<ActorInfo> {
+    track.arena.actors().filter(|actor| actor.name == name).cloned().collect()
+}
+
+/// Place and velocity of the body with a serial.
+fn motion(track: &TestTrack, serial: u32) -> (DVec3, DVec3) {
+    let slice = track.arena.world().slices().find(|slice| slice.serial == serial).expect("a living body");
+    (DVec3::from_slice(slice.q), DVec3::from_slice(slice.v))
+}
+
+/// What became of each of some bodies: highest place, m, fastest, m/s, and where it ended, m.
+struct Flight {
+    highest: f64,
+    fastest: f64,
+    end: DVec3,
+}
+
+/// Runs for `seconds` and watches bodies by their serials.
+fn watch(track: &mut TestTrack, serials: &[u32], seconds: f64) -> Vec<Flight> {
+    let mut flights: Vec<_> =
+        serials.iter().map(|_| Flight { highest: f64::MIN, fastest: 0.0, end: DVec3::ZERO }).collect();
+    for tick in 0..(seconds * 30.0) as usize {
+        track.drive(0, Controls::default());
+        track.tick();
+        let report = track.arena.world().report();
+        assert_eq!(report.quarantined, 0, "tick {tick}: {report:?}");
+        for (flight, &serial) in flights.iter_mut().zip(serials) {
+            let (at, velocity) = motion(track, serial);
+            flight.highest = flight.highest.max(at.y);
+            flight.fastest = flight.fastest.max(velocity.length());
+            flight.end = at;
+        }
+    }
+    flights
+}
+
+#[test]
+fn it_lifts_crates_that_sleep_and_drops_them() {
+    let mut track = TestTrack::new(&format!("{FLAT}{CRATES}{}", tornado(0.0, STAYS)), SETTINGS);
+    let crates: Vec<_> = named(&track, "crate").iter().map(|info| info.parts[0].slice).collect();
+    assert_eq!(crates.len(), 12);
+    for (i, flight) in watch(&mut track, &crates, 16.0).iter().enumerate() {
+        let Flight { highest, fastest, end } = flight;
+        assert!(*highest > 5.0 && *highest < 40.0, "crate {i}: {highest} m");
+        assert!(*fastest < 35.0, "crate {i}: {fastest} m/s");
+        assert!(end.y < 1.3, "crate {i} is still up: {end}");
+    }
+}
+
+#[test]
+fn it_lifts_a_car_and_drops_it() {
+    // The free spawn point that is farthest from where the tornado starts.
+    let legs = "legs = [{ to = [28.0, 0.0, 21.0], frequency = 0.1 }, { to = [70.0, 0.0, 21.0], frequency = 0.1 }]";
+    let tornado = format!("[[actors]]\nkind = \"tornado\"\nposition = [-40.0, 0.0, -21.0]\n{STAYS}\n{legs}\n");
+    let mut track = TestTrack::new(&format!("{FLAT}{tornado}"), SETTINGS);
+    track.enter(0);
+    track.tick();
+    let chassis = track.arena.actor_of(0).unwrap().parts[0].slice;
+    let flight = watch(&mut track, &[chassis], 20.0).remove(0);
+    println!("{:.1} m, {:.1} m/s, ends at {:.1}", flight.highest, flight.fastest, flight.end);
+    assert!(flight.highest > 5.0 && flight.highest < 40.0, "{} m", flight.highest);
+    assert!(flight.fastest < 35.0, "{} m/s", flight.fastest);
+    assert!(flight.end.y < 2.0, "still up: {}", flight.end);
+}
+
+/// On its way it stays on the ground, its waist and top stay behind, and its dust swirls about the foot, in bounded number
+/// and by the bodies that were there from the start; where it does not touch ground there is none.
+#[test]
+fn it_leans_and_raises_dust_where_it_touches_ground() {
+    for (height, expected) in [(0.0, 12..=32), (12.0, 0..=0)] {
+        let mut track = TestTrack::new(&format!("{FLAT}{}", tornado(height, STAYS)), SETTINGS);
+        let tornado = named(&track, "twister").remove(0);
+        let bodies = track.arena.world().body_count();
+        let (mut most, mut lean) = (0, 0.0f64);
+        for _ in 0..6 * 30 {
+            track.tick();
+            let [foot, top] = [0, 2].map(|part: usize| motion(&track, tornado.parts[part].slice).0);
+            assert!((foot.y - height).abs() < 0.01 && (top.y - height - 14.0).abs() < 0.5, "{foot} {top}");
+            lean = lean.max(foot.x - top.x);
+            let dust = tornado.parts[3..].iter().map(|part| motion(&track, part.slice));
+            let flying: Vec<_> = dust.filter(|(at, _)| at.y > height - 0.9).collect();
+            most = most.max(flying.len());
+            for (at, velocity) in flying {
+                assert!((at - foot).with_y(0.0).length() < 10.0 && velocity.length() < 30.0, "{at} {velocity}");
+            }
+        }
+        assert!(expected.contains(&most), "{most} particles at a height of {height} m");
+        assert!(lean > 1.0 && lean < 8.0, "{lean} m");
+        assert_eq!(track.arena.world().body_count(), bodies);
+    }
+}
+
+/// The mesh follows the spheres: its foot ring is about the foot, its top ring about the top, and it spins.
+#[test]
+fn its_mesh_spins_and_warps_as_its_spheres_move() {
+    let mut track = TestTrack::new(&format!("{FLAT}{}", tornado(0.0, STAYS)), SETTINGS);
+    let tornado = named(&track, "twister").remove(0);
+    let rest = mesh::mesh(&TornadoParameters::default());
+    let centre = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
+    let mut spins = Vec::new();
+    for tick in 0..5 * 30 {
+        let [foot, top] = [0, 2].map(|part: usize| motion(&track, tornado.parts[part].slice).0);
+        track.tick();
+        let shown = track.arena.appearance(tornado.id).unwrap();
+        spins.push(shown.spin);
+        let mut points = rest.clone();
+        shown.deform(foot, &mut points);
+        assert!(centre(&points[..mesh::SECTORS]).distance(foot) < 0.01);
+        if tick < 58 {
+            assert!(shown.strength < 1.0, "tick {tick}");
+        } else {
+            let tip = centre(&points[points.len() - mesh::SECTORS..]);
+            assert!(tip.distance(top) < 0.5, "tick {tick}: {tip} at {top}");
+        }
+    }
+    assert!(spins.iter().all(|spin| (0.0..std::f64::consts::TAU).contains(spin)));
+    assert!(spins.windows(2).all(|pair| pair[0] != pair[1]));
+}
+
+/// It disappears with nobody in its hands, and appears again at the end of the next leg.
+#[test]
+fn it_disappears_and_appears_elsewhere() {
+    let life = "stay_time = 2.0\nfade_time = 1.0\naway_time = 2.0";
+    let mut track = TestTrack::new(&format!("{FLAT}{CRATES}{}", tornado(0.0, life)), SETTINGS);
+    let tornado = named(&track, "twister").remove(0);
+    let mut strengths = Vec::new();
+    for _ in 0..8 * 30 {
+        track.tick();
+        strengths.push(track.arena.appearance(tornado.id).unwrap().strength);
+    }
+    assert!(strengths[100..140].contains(&0.0) && strengths.contains(&1.0) && strengths[239] > 0.0);
+    assert!(strengths.windows(2).all(|pair| (pair[0] - pair[1]).abs() < 0.06));
+    let crates: Vec<_> = named(&track, "crate").iter().map(|info| info.parts[0].slice).collect();
+    assert!(crates.iter().all(|&serial| motion(&track, serial).0.is_finite()));
+}
+
+#[test]
+fn wrong_parameters_are_named() {
+    let refused = |text: &str, settings: &ArenaSettings| {
+        Arena::from_toml(&format!("{FLAT}{text}"), settings).err().expect("it is refused").to_string()
+    };
+    for (keys, expected) in [
+        ("height = 1.0", "actors[0].height is 1, allowed: 2 to 200 m"),
+        ("heigth = 14.0", "heigth"),
+        ("warp = [{ at = 1.0 }, { at = 0.5 }]\nwarp_period = 2.0", "actors[0].warp[1].at"),
+        ("warp = [{ at = 1.0 }, { at = 2.5 }]\nwarp_period = 1.0", "actors[0].warp_period"),
+    ] {
+        let error = refused(&tornado(0.0, keys), &SETTINGS);
+        assert!(error.contains(expected), "{error}");
+    }
+    assert!(refused(&tornado(9e3, ""), &SETTINGS).contains("actors[0].position"));
+    assert!(refused(&tornado(0.0, "").replace("30.0, 0", "6e3, 0"), &SETTINGS).contains("actors[0]"));
+    let quick = tornado(0.0, "").replace("0.06 }", "1.5, damping_ratio = 0.3 }");
+    assert!(refused(&quick, &ArenaSettings { tick_hz: 5, ..SETTINGS }).contains("leg 0"));
+}
