@@ -48,9 +48,10 @@ pub use error::SimError;
 pub use glam::{DMat3, DQuat, DVec3};
 pub use integrate::{Method, Preconditioner, StepReport, StoppedBecause};
 pub use potential::{
-    Anchor, AngleLimitDesc, AngleLimitId, AxleControl, AxleDesc, AxleId, BallJointDesc, BallJointId, DistanceLimitDesc,
-    DistanceLimitId, Driven, FixedJointDesc, FixedJointId, HingeDesc, HingeId, Motor, MotorDesc, MotorId, PdControl,
-    PdDesc, PdId, RodDesc, RodId, SliderDesc, SliderId, SpringDesc, SpringId, UniversalJointDesc, UniversalJointId,
+    Anchor, AngleLimitDesc, AngleLimitId, AntiRollBarDesc, AntiRollBarId, AxleControl, AxleDesc, AxleId, BallJointDesc,
+    BallJointId, DistanceLimitDesc, DistanceLimitId, Driven, FixedJointDesc, FixedJointId, HingeDesc, HingeId, Motor,
+    MotorDesc, MotorId, PdControl, PdDesc, PdId, RodDesc, RodId, SliderDesc, SliderId, SpringDesc, SpringId,
+    UniversalJointDesc, UniversalJointId,
 };
 pub use settings::{ContactSettings, Settings, SleepSettings, SolverSettings};
 pub use world::{Energy, Momentum, SliceView, World};

@@ -9,7 +9,6 @@ use super::wheels;
 use crate::collide::{ContactPoint, Partner, Surface};
 use crate::dof::{ABSENT, BLOCK_RATES_MAX, BodyId, FigureBody, Frame, Inertia, Node, PartPoint, Placed, Twist};
 use crate::island::Islands;
-use crate::potential::axle::AxleTerm;
 use crate::potential::ball_joint::BallJointTerm;
 use crate::potential::contact::{Approach, ContactTerm};
 use crate::potential::hold::{Held, STRONGEST, Scale};
@@ -152,16 +151,7 @@ impl Integrator {
             solve.ball_joints.push(id);
         }
         self.gather_joints(scene);
-        for (_, desc) in scene.potentials.axles.awake() {
-            let anchors = [desc.chassis, desc.wheel].map(|id| Anchor::body(id, DVec3::ZERO));
-            let Some((solve, ends)) = self.localise_anchors(scene, anchors) else { continue };
-            let frames = ends.map(|end| end.frame);
-            let nodes = [0, 1].map(|i| solve.node(frames[i]));
-            let [Some(chassis), Some(wheel)] = nodes else { continue };
-            let term = AxleTerm::new(frames, desc, [chassis, wheel], solver.joint_stiffness, *dt);
-            solve.carry_wheel(ends, [term.axis(), DVec3::Z]);
-            solve.problem.terms.axles.push(term);
-        }
+        self.gather_axles(scene);
         for (_, (desc, gains)) in scene.potentials.pds.awake() {
             let anchors = [desc.at, Anchor::world(DVec3::ZERO)];
             let Some((solve, [end, _])) = self.localise_anchors(scene, anchors) else { continue };

@@ -1,9 +1,11 @@
-//! Gathering of joints that hold turns, and of what limits and drives them.
+//! Gathering of joints that hold turns, of what limits and drives them, and of axles.
 
 use glam::DVec3;
 
-use super::step::{Integrator, Scene};
+use super::step::{Integrator, Scene, Solve};
 use crate::potential::alignment::{Aligned, Alignment, Captured};
+use crate::potential::anti_roll_bar::AntiRollTerm;
+use crate::potential::axle::AxleTerm;
 use crate::potential::ball_joint::BallJointTerm;
 use crate::potential::hold::Held;
 use crate::potential::limit::AngleLimitTerm;
@@ -11,7 +13,7 @@ use crate::potential::motor::MotorTerm;
 use crate::potential::rod::RodTerm;
 use crate::potential::slider::LineTerm;
 use crate::potential::universal_joint::RightAngle;
-use crate::potential::{Driven, MotorDesc};
+use crate::potential::{Anchor, AxleDesc, Driven, End, MotorDesc};
 
 impl Integrator {
     pub(super) fn gather_joints(&mut self, scene: &Scene) {
@@ -86,12 +88,20 @@ impl Integrator {
                     let Captured { desc, axes } = scene.potentials.sliders[id].desc;
                     ([desc.a, desc.b], axes[0][0])
                 }
+                Driven::Wheels(_) => match scene.potentials.ends_of(joint) {
+                    Some(anchors) => (anchors, DVec3::Z),
+                    None => continue,
+                },
             };
             let Some((solve, ends)) = self.localise_anchors(scene, anchors) else { continue };
             let (frames, starts) = (ends.map(|end| end.frame), ends.map(|end| solve.start(end)));
-            let axis = starts[0].arm(axis).into();
+            let axis: DVec3 = starts[0].arm(axis).into();
             let term = match joint {
                 Driven::Hinge(_) => MotorTerm::turning(frames, motor, axis),
+                Driven::Wheels(_) => {
+                    let other: DVec3 = starts[1].arm(DVec3::Z).into();
+                    MotorTerm::turning(frames, motor, (axis + other).normalize_or(axis))
+                }
                 Driven::Slider(_) => {
                     let driven = starts[1].place(ends[1].point);
                     let arms = starts.map(|start| driven - DVec3::from(start.position));
@@ -100,5 +110,37 @@ impl Integrator {
             };
             solve.problem.terms.motors.push(term);
         }
+    }
+
+    pub(super) fn gather_axles(&mut self, scene: &Scene) {
+        let (dt, stiffness) = (scene.settings.dt, scene.settings.solver.joint_stiffness);
+        for (_, desc) in scene.potentials.axles.awake() {
+            let Some((solve, ends)) = self.localise_axle(scene, desc) else { continue };
+            let frames = ends.map(|end| end.frame);
+            let [Some(chassis), Some(wheel)] = frames.map(|frame| solve.node(frame)) else { continue };
+            let term = AxleTerm::new(frames, desc, [chassis, wheel], stiffness, dt);
+            solve.carry_wheel(ends, [term.axis(), DVec3::Z]);
+            solve.problem.terms.axles.push(term);
+        }
+        for (_, bar) in scene.potentials.anti_roll_bars.awake() {
+            let axles = bar.axles.map(|id| &scene.potentials.axles[id]);
+            let [Some(left), Some(right)] = axles.map(|axle| self.expected_travel(scene, axle)) else { continue };
+            for (axle, other) in axles.into_iter().zip([right, left]) {
+                let Some((solve, ends)) = self.localise_axle(scene, axle) else { continue };
+                let term = AntiRollTerm::new(ends.map(|end| end.frame), axle, bar.stiffness, other);
+                solve.problem.terms.anti_roll_bars.push(term);
+            }
+        }
+    }
+
+    /// See [`AntiRollTerm::expected_travel`].
+    fn expected_travel(&mut self, scene: &Scene, axle: &AxleDesc) -> Option<f64> {
+        let (solve, ends) = self.localise_axle(scene, axle)?;
+        let [chassis, wheel] = ends.map(|end| solve.node(end.frame));
+        Some(AntiRollTerm::expected_travel(axle, [chassis?, wheel?], scene.settings.dt))
+    }
+
+    fn localise_axle(&mut self, scene: &Scene, axle: &AxleDesc) -> Option<(&mut Solve, [End; 2])> {
+        self.localise_anchors(scene, [axle.chassis, axle.wheel].map(|id| Anchor::body(id, DVec3::ZERO)))
     }
 }

@@ -6,6 +6,7 @@ use super::block::{Block, Entry};
 use super::figure::{Blocks, Figures};
 use crate::autodiff::Dual;
 use crate::dof::{BLOCK_RATES_MAX, Frame, Node, Twist};
+use crate::potential::anti_roll_bar::AntiRollTerm;
 use crate::potential::axle::AxleTerm;
 use crate::potential::ball_joint::BallJointTerm;
 use crate::potential::contact::{ContactTerm, Slide};
@@ -62,6 +63,7 @@ terms! {
     angle_limits: AngleLimitTerm,
     motors: MotorTerm,
     axles: AxleTerm,
+    anti_roll_bars: AntiRollTerm,
     pds: PdTerm,
 }
 

@@ -5,6 +5,7 @@
 //! translations in m, rotations as small world-axis turns in rad. Gradients are minus the force and torque, N and N m.
 
 pub(crate) mod alignment;
+pub(crate) mod anti_roll_bar;
 pub(crate) mod axle;
 pub(crate) mod ball_joint;
 pub(crate) mod contact;
@@ -31,6 +32,7 @@ use std::ops::AddAssign;
 use glam::{DMat3, DVec3};
 
 use alignment::Captured;
+pub use anti_roll_bar::{AntiRollBarDesc, AntiRollBarId};
 pub use axle::{AxleControl, AxleDesc, AxleId, Motor};
 pub use ball_joint::{BallJointDesc, BallJointId};
 pub use fixed_joint::{FixedJointDesc, FixedJointId};
@@ -93,11 +95,12 @@ pub(crate) struct Potentials {
     pub angle_limits: Pool<AngleLimitId, Held<AngleLimitDesc>>,
     pub motors: Pool<MotorId, MotorDesc>,
     pub axles: Pool<AxleId, AxleDesc>,
+    pub anti_roll_bars: Pool<AntiRollBarId, AntiRollBarDesc>,
     pub pds: Pool<PdId, (PdDesc, PdGains)>,
 }
 
 impl Potentials {
-    /// Both ends of every potential that takes part; angle limits and motors share those of their joint.
+    /// Both ends of every potential that takes part; angle limits, motors and anti-roll bars share those of their joints.
     pub fn pairs(&self) -> impl Iterator<Item = [Anchor; 2]> + '_ {
         let springs = self.springs.awake().map(|(_, s)| [s.a, s.b]);
         let rods = self.rods.awake().map(|(_, r)| [r.desc.a, r.desc.b]);
@@ -126,11 +129,14 @@ impl Potentials {
         self.distance_limits.sort(|l| any(l.desc.a, l.desc.b));
         self.axles.sort(|a| is_awake(a.chassis) || is_awake(a.wheel));
         self.pds.sort(|(pd, _)| any(pd.at, pd.at));
-        let Self { hinges, sliders, angle_limits, motors, .. } = self;
+        let Self { hinges, sliders, axles, angle_limits, motors, anti_roll_bars, .. } = self;
+        let any_wheel = |pair: [AxleId; 2]| pair.iter().filter_map(|&id| axles.get(id)).any(|a| is_awake(a.wheel));
+        anti_roll_bars.sort(|bar| any_wheel(bar.axles));
         angle_limits.sort(|l| hinges.get(l.desc.hinge).is_some_and(|h| any(h.desc.desc.a, h.desc.desc.b)));
         motors.sort(|m| match m.joint {
             Driven::Hinge(id) => hinges.get(id).is_some_and(|h| any(h.desc.desc.a, h.desc.desc.b)),
             Driven::Slider(id) => sliders.get(id).is_some_and(|s| any(s.desc.desc.a, s.desc.desc.b)),
+            Driven::Wheels(pair) => any_wheel(pair),
         });
     }
 
@@ -139,7 +145,15 @@ impl Potentials {
         match joint {
             Driven::Hinge(id) => self.hinges.get(id).map(|h| [h.desc.desc.a, h.desc.desc.b]),
             Driven::Slider(id) => self.sliders.get(id).map(|s| [s.desc.desc.a, s.desc.desc.b]),
+            Driven::Wheels(pair) => self.wheels_of(pair).map(|wheels| wheels.map(|id| Anchor::body(id, DVec3::ZERO))),
         }
+    }
+
+    /// The wheels of two axles of one chassis; `None` where they are not of one.
+    pub fn wheels_of(&self, pair: [AxleId; 2]) -> Option<[BodyId; 2]> {
+        let [a, b] = pair.map(|id| self.axles.get(id));
+        let (a, b) = (a?, b?);
+        (a.chassis == b.chassis && a.wheel != b.wheel).then_some([a.wheel, b.wheel])
     }
 
     /// Removes every potential of a body.
@@ -153,18 +167,21 @@ impl Potentials {
         self.fixed_joints.retain(|_, j| stays([j.desc.desc.a.body, j.desc.desc.b.body]));
         self.sliders.retain(|_, s| stays([s.desc.desc.a.body, s.desc.desc.b.body]));
         self.distance_limits.retain(|_, l| stays([l.desc.a.body, l.desc.b.body]));
-        self.remove_orphans();
         self.axles.retain(|_, a| stays([Some(a.chassis), Some(a.wheel)]));
+        self.remove_orphans();
         self.pds.retain(|_, (pd, _)| pd.at.body != Some(body));
     }
 
-    /// Removes what drives or limits a joint that is gone.
+    /// Removes what drives, limits or couples joints that are gone.
     pub fn remove_orphans(&mut self) {
-        let Self { hinges, sliders, angle_limits, motors, .. } = self;
+        let Self { hinges, sliders, axles, angle_limits, motors, anti_roll_bars, .. } = self;
+        let has_both = |pair: [AxleId; 2]| pair.iter().all(|&id| axles.contains_key(id));
+        anti_roll_bars.retain(|_, bar| has_both(bar.axles));
         angle_limits.retain(|_, limit| hinges.contains_key(limit.desc.hinge));
         motors.retain(|_, motor| match motor.joint {
             Driven::Hinge(hinge) => hinges.contains_key(hinge),
             Driven::Slider(slider) => sliders.contains_key(slider),
+            Driven::Wheels(pair) => has_both(pair),
         });
     }
 }

@@ -1,9 +1,10 @@
-//! Motor: a torque about a hinge's axis, or a force along a slider's, towards a velocity and never above a limit.
+//! Motor: a torque about a hinge's axis, between two wheels, or a force along a slider's, towards a velocity and never
+//! above a limit.
 
 use glam::{DMat3, DVec3};
 
 use super::axle::{Motor, clamped};
-use super::{FrameIndex, HingeId, PairBlocks, SliderId, Term, Wrench, outer};
+use super::{AxleId, FrameIndex, HingeId, PairBlocks, SliderId, Term, Wrench, outer};
 use crate::autodiff::{Scalar, Vec3};
 use crate::dof::Frame;
 use crate::error::{SimError, require};
@@ -23,13 +24,16 @@ pub struct MotorDesc {
     pub motor: Motor,
 }
 
-/// A joint that a motor drives: its second end against its first.
+/// What a motor drives: the second end of a joint against its first, the second wheel against the first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Driven {
     /// About its axis.
     Hinge(HingeId),
     /// Along its axis.
     Slider(SliderId),
+    /// The wheels of two axles of one chassis, about the mean of their axes. At a target of 0 it is the clutch of a limited
+    /// or locked differential.
+    Wheels([AxleId; 2]),
 }
 
 impl Motor {

@@ -4,6 +4,7 @@ use glam::DQuat;
 use proptest::prelude::*;
 
 use super::alignment::{Aligned, Alignment};
+use super::anti_roll_bar::AntiRollTerm;
 use super::axle::AxleTerm;
 use super::ball_joint::BallJointTerm;
 use super::contact::{Approach, ContactTerm};
@@ -356,6 +357,15 @@ proptest! {
         let desc = AxleDesc { chassis, wheel, hub, stiffness: 400.0, damping: 30.0, control };
         let nodes = [node(10.0, DVec3::new(1.0, 2.0, 2.5), &t), node(1.0, DVec3::new(0.1, 0.1, 0.2), &u)];
         let term = AxleTerm::new([0, 1], &desc, [&nodes[0], &nodes[1]], 3.0, DT);
+        check_gradient(&term, &[t, u]);
+        automatic_hessian(&term, &[t, u], 1e-5);
+    }
+
+    #[test]
+    fn anti_roll_bar_derives(t in frame(), u in frame(), hub in vector(), other in -0.3..0.3) {
+        let (chassis, wheel, control) = (BodyId::default(), BodyId::default(), AxleControl::default());
+        let axle = AxleDesc { chassis, wheel, hub, stiffness: 400.0, damping: 30.0, control };
+        let term = AntiRollTerm::new([0, 1], &axle, 200.0, other);
         check_gradient(&term, &[t, u]);
         automatic_hessian(&term, &[t, u], 1e-5);
     }

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::World;
+use super::potentials::NO_PAIR;
 use crate::dof::{DofKind, Frame, PartPoint};
 use crate::error::{SimError, require};
 use crate::potential::alignment::Captured;
@@ -104,14 +105,17 @@ impl World {
         Ok(self.potentials.angle_limits.insert(Held::new(desc)))
     }
 
-    /// Adds a motor to a hinge or slider.
+    /// Adds a motor to a hinge, a slider or a pair of wheels.
     ///
     /// # Errors
-    /// [`SimError`] for a value out of range, or a joint that is gone.
+    /// [`SimError`] for a value out of range, a joint that is gone, or wheels that are not of one chassis.
     pub fn add_motor(&mut self, desc: MotorDesc) -> Result<MotorId, SimError> {
         desc.motor.validate()?;
         let Some([a, b]) = self.potentials.ends_of(desc.joint) else {
-            return Err(SimError::Gone { what: "the joint of the motor" });
+            return Err(match desc.joint {
+                Driven::Wheels(_) => SimError::Unusable { what: NO_PAIR },
+                _ => SimError::Gone { what: "the joint of the motor" },
+            });
         };
         self.rouse_ends(a, b);
         Ok(self.potentials.motors.insert(desc))

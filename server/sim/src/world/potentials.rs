@@ -7,9 +7,12 @@ use crate::dof::DofKind;
 use crate::error::{SimError, require, require_vector};
 use crate::potential::hold::Held;
 use crate::potential::{
-    Anchor, AxleControl, AxleDesc, AxleId, BallJointDesc, BallJointId, PdControl, PdDesc, PdId, RodDesc, RodId,
-    SpringDesc, SpringId,
+    Anchor, AntiRollBarDesc, AntiRollBarId, AxleControl, AxleDesc, AxleId, BallJointDesc, BallJointId, PdControl,
+    PdDesc, PdId, RodDesc, RodId, SpringDesc, SpringId,
 };
+
+/// Why two axles cannot be coupled.
+pub(super) const NO_PAIR: &str = "two axles that are coupled must exist and carry different wheels of one chassis";
 
 impl World {
     /// Adds a spring with a damper.
@@ -61,6 +64,17 @@ impl World {
         Ok(self.potentials.axles.insert(desc))
     }
 
+    /// Adds an anti-roll bar.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, or axles that are gone or not of one chassis.
+    pub fn add_anti_roll_bar(&mut self, desc: AntiRollBarDesc) -> Result<AntiRollBarId, SimError> {
+        desc.validate()?;
+        let wheels = self.potentials.wheels_of(desc.axles).ok_or(SimError::Unusable { what: NO_PAIR })?;
+        wheels.into_iter().for_each(|id| self.rouse(id));
+        Ok(self.potentials.anti_roll_bars.insert(desc))
+    }
+
     /// Adds a PD controller.
     ///
     /// # Errors
@@ -99,6 +113,14 @@ impl World {
     pub fn remove_ball_joint(&mut self, id: BallJointId) -> bool {
         let Some(joint) = self.potentials.ball_joints.remove(id) else { return false };
         self.include(joint.desc.a, joint.desc.b);
+        true
+    }
+
+    /// Removes an anti-roll bar. Answers whether there was one.
+    pub fn remove_anti_roll_bar(&mut self, id: AntiRollBarId) -> bool {
+        let Some(bar) = self.potentials.anti_roll_bars.remove(id) else { return false };
+        let wheels = self.potentials.wheels_of(bar.axles);
+        wheels.into_iter().flatten().for_each(|id| self.rouse(id));
         true
     }
 

@@ -111,6 +111,23 @@ impl World {
         Ok(())
     }
 
+    /// Turns a rigid body during the coming tick with `torque`, N m in world axes.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, a body of another kind, or one that is gone.
+    pub fn apply_torque(&mut self, id: BodyId, torque: DVec3) -> Result<(), SimError> {
+        require_vector(torque, "torque")?;
+        let id = self.simple_body(id)?;
+        if self.bodies[id].kind == DofKind::Particle {
+            return Err(SimError::Unusable { what: "a particle does not turn" });
+        }
+        if torque != DVec3::ZERO {
+            self.rouse(id);
+        }
+        self.bodies[id].torque += torque;
+        Ok(())
+    }
+
     /// Pushes a body of any kind during the coming tick with `force`, N, at a material point; a particle has but one.
     ///
     /// # Errors

@@ -6,6 +6,7 @@ mod closed_form;
 mod collisions;
 mod contact_events;
 mod contact_loads;
+mod couplings;
 mod determinism;
 mod elasticity;
 mod fast_things;
