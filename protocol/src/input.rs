@@ -36,6 +36,14 @@ pub mod buttons {
     pub const HANDBRAKE: u16 = 2;
     /// Put the vehicle back on its wheels where it is.
     pub const RESET: u16 = 4;
+    /// Push from behind.
+    pub const BOOST: u16 = 8;
+    /// Jump.
+    pub const JUMP: u16 = 16;
+    /// Fire the weapon that is at hand.
+    pub const FIRE: u16 = 32;
+    /// Take the next weapon.
+    pub const NEXT_WEAPON: u16 = 64;
 }
 
 impl Controls {

@@ -215,6 +215,10 @@ fn to_game(controls: &Controls) -> GameControls {
         reverse: pressed(buttons::REVERSE),
         handbrake: pressed(buttons::HANDBRAKE),
         reset: pressed(buttons::RESET),
+        boost: pressed(buttons::BOOST),
+        jump: pressed(buttons::JUMP),
+        fire: pressed(buttons::FIRE),
+        next_weapon: pressed(buttons::NEXT_WEAPON),
     }
 }
 

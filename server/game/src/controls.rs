@@ -15,6 +15,14 @@ pub struct Controls {
     pub handbrake: bool,
     /// Puts the vehicle back on its wheels where it is; acts when it becomes true.
     pub reset: bool,
+    /// Pushes from behind as long as the tank lasts.
+    pub boost: bool,
+    /// Jumps; acts when it becomes true.
+    pub jump: bool,
+    /// Fires the weapon that is at hand.
+    pub fire: bool,
+    /// Takes the next weapon; acts when it becomes true.
+    pub next_weapon: bool,
 }
 
 impl Controls {

@@ -27,7 +27,7 @@ pub struct BodyState {
 }
 
 /// What an actor knows from tick to tick beside its bodies' states; what the numbers mean is the actor's.
-pub type Memory = [f64; 8];
+pub type Memory = [f64; 16];
 
 /// A car, all of it: bodies in the order of its parts.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,24 +1,31 @@
 //! A car: a chassis and four wheels, all of them rigid bodies, held together and driven by potentials.
 //!
-//! Owns the vehicle's logic in stage 3: from the controls of its driver to steering angles, drive torques and brakes.
-//! The bodies are [`rig`]'s, the smoothing of the controls is [`response`]'s, the numbers are [`parameters`]'.
-//! The vehicle pushes on the world only through the controls of its four axles.
+//! Owns the vehicle's logic in stage 3: from the controls of its driver to steering angles, drive torques, brakes and
+//! pushes. The bodies are [`rig`]'s, the smoothing of the controls is [`response`]'s, engine and gears are
+//! [`drive_train`]'s, [`brakes`] has the brakes, [`stunts`] what no real car does, [`parameters`] the numbers.
+//! The vehicle pushes on the world only through its axles, the clutches between them, and forces for one tick.
 
+pub mod brakes;
+pub mod drive_train;
 pub mod parameters;
 pub mod response;
 pub mod rig;
+pub mod stunts;
 
 use glam::DVec3;
-use pita_sim::{AxleControl, BodyId, Motor, SimError, World};
+use pita_sim::{AxleControl, BodyId, Motor, Phase, SimError, World};
 
-use crate::actor::{Actor, ActorInfo, WhenLost};
+use crate::actor::{Actor, ActorInfo, Contact, Response, WhenLost};
 use crate::driver::{Driver, Motion};
 use crate::rehearsal::Memory;
 use crate::step::Step;
 use crate::{Controls, Pose};
-pub use parameters::{Drive, VehicleParameters};
-use response::Response;
+use brakes::Braking;
+use drive_train::DriveTrain;
+pub use parameters::VehicleParameters;
+use response::Pedals;
 use rig::{Rig, WHEELS, Wheel};
+use stunts::{Footing, Stage, Stunts};
 
 /// Height of the wheels above the underside of the car that was, after a reset, m: clears the ground where an overturned
 /// car is reset on a slope.
@@ -30,10 +37,6 @@ const RESET_SPEED_MAX: f64 = 3.0;
 /// Time between two resets of a car, s.
 const RESET_REST: f64 = 2.0;
 
-/// Slip at which a driven wheel's torque passes from none to full, rad/s. A motor that switches within a smaller band is
-/// stiff against the wheel's inertia and costs Newton iterations; a wider one leaves top speed short.
-const MOTOR_BAND: f64 = 4.0;
-
 /// A car with its driver.
 pub struct Vehicle {
     info: ActorInfo,
@@ -41,7 +44,10 @@ pub struct Vehicle {
     rig: Rig,
     driver: Driver,
     controls: Controls,
-    response: Response,
+    response: Pedals,
+    drive_train: DriveTrain,
+    stunts: Stunts,
+    touches: Touches,
     reset_was_held: bool,
     /// Time until the reset button works again, s.
     reset_rest: f64,
@@ -62,8 +68,19 @@ impl Vehicle {
         let rig = Rig::add(world, &parameters, pose)?;
         let Identity { id, name, slot } = identity;
         let info = ActorInfo { id, kind: "vehicle", name, slot, parts: rig.parts(world) };
-        let (controls, response) = (Controls::default(), Response::default());
-        Ok(Self { info, parameters, rig, driver, controls, response, reset_was_held: false, reset_rest: 0.0 })
+        Ok(Self {
+            info,
+            stunts: Stunts::new(&parameters),
+            parameters,
+            rig,
+            driver,
+            controls: Controls::default(),
+            response: Pedals::default(),
+            drive_train: DriveTrain::default(),
+            touches: Touches::default(),
+            reset_was_held: false,
+            reset_rest: 0.0,
+        })
     }
 
     /// Puts the car back on its wheels where it is, when the button goes down. Not while it still moves fast, nor again
@@ -82,47 +99,53 @@ impl Vehicle {
         self.place(step.world, pose)
     }
 
-    /// What the axle of `wheel` is told, at the forward speed `speed` in m/s.
-    fn axle_control(&self, wheel: Wheel, speed: f64) -> AxleControl {
-        let p = &self.parameters;
-        AxleControl {
-            steer: if wheel.is_front() { p.wheel_angle(self.response.steer(), wheel.z(p)) } else { 0.0 },
-            drive: if p.drive.drives(wheel) { self.motor(speed) } else { Motor::default() },
-            brake: self.brake(wheel),
+    /// Steers, drives and brakes the wheels.
+    fn move_wheels(&mut self, step: &mut Step, speed: f64) -> Result<(), SimError> {
+        let (p, world) = (&self.parameters, &mut *step.world);
+        let steer = |wheel: Wheel| match wheel.is_front() {
+            true => p.wheel_angle(self.response.steer(), wheel.z(p)),
+            false => 0.0,
+        };
+        let rolling = WHEELS.map(|wheel| self.rig.rolling(world, wheel, steer(wheel)));
+        let driven = WHEELS.iter().zip(&rolling).filter(|(wheel, _)| p.drive.drives(**wheel));
+        let (count, sum) = driven.fold((0.0, 0.0), |(count, sum), (_, rolling)| (count + 1.0, sum + rolling.spin));
+        let Controls { reverse, handbrake, .. } = self.controls;
+        let output = self.drive_train.drive(p, self.response.throttle(), reverse, [speed, sum / count], step.dt);
+        self.rig.set_clutches(world, [true, false].map(|front| output.clutch(p, front, step.dt)))?;
+        for (wheel, rolling) in WHEELS.into_iter().zip(&rolling) {
+            let (drive, brake) = match Braking::of(p, wheel, self.response.brake(), handbrake, rolling, step.dt) {
+                Braking::Released if p.drive.drives(wheel) => (output.motor(p, wheel, rolling), 0.0),
+                Braking::Released => (Motor::default(), 0.0),
+                Braking::Blocking(torque) => (Motor::default(), torque),
+                Braking::AntiLock(motor) => (motor, 0.0),
+            };
+            self.rig.set_axle(world, wheel, AxleControl { steer: steer(wheel), drive, brake })?;
         }
+        Ok(())
     }
 
-    /// The engine's share of one driven wheel.
-    ///
-    /// It asks for the speed that the car can have and gives what torque the throttle and the power allow. The
-    /// asked-for speed is kept near the car's own, so that wheels do not spin away and lose their side force.
-    fn motor(&self, speed: f64) -> Motor {
-        let p = &self.parameters;
-        let wheels = p.drive.wheels();
-        let throttle = self.response.throttle();
-        let (direction, top) = if self.controls.reverse { (-1.0, p.reverse_speed) } else { (1.0, p.top_speed) };
-        if throttle <= 0.0 {
-            // The engine turns with the wheels and brakes them.
-            return motor(0.0, p.coast_torque / wheels);
-        }
-        let wanted = (speed * direction).max(0.0) + p.launch_slip;
-        let by_power = p.engine_power / (speed.abs().max(1.0) / p.wheel_radius);
-        let torque = throttle * p.engine_torque.min(by_power) / wheels;
-        // A wheel that rolls towards +x turns about −z.
-        motor(-direction * wanted.min(top) / p.wheel_radius, torque)
+    /// The air's share, implicit in the speed.
+    fn drag(&self, step: &mut Step, motion: &Motion) -> Result<(), SimError> {
+        let slowing = self.parameters.drag * motion.velocity.length();
+        let force = -motion.velocity * (slowing / (1.0 + slowing * step.dt / self.parameters.mass()));
+        step.world.apply_force(self.rig.chassis(), force, motion.position)
     }
 
-    fn brake(&self, wheel: Wheel) -> f64 {
-        let p = &self.parameters;
-        let pedal = self.response.brake() * if wheel.is_front() { p.brake_torque_front } else { p.brake_torque_rear };
-        let by_hand = self.controls.handbrake && !wheel.is_front();
-        if by_hand { pedal.max(p.handbrake_torque) } else { pedal }
+    /// What the car touches in this tick. Of what sleeps nothing is told: it stands.
+    fn footing(&mut self, world: &World) -> Footing {
+        let Touches { wheels, chassis } = std::mem::take(&mut self.touches);
+        match world.is_asleep(self.rig.chassis()) {
+            true => Footing { wheels: WHEELS.len(), chassis: false },
+            false => Footing { wheels: wheels.into_iter().filter(|touches| *touches).count(), chassis },
+        }
     }
 }
 
-/// Full torque at a slip of [`MOTOR_BAND`], nothing at the target.
-fn motor(target_speed: f64, max_torque: f64) -> Motor {
-    Motor { target_speed, gain: max_torque / MOTOR_BAND, max_torque }
+/// What the collision procedure told since the last step.
+#[derive(Clone, Copy, Debug, Default)]
+struct Touches {
+    wheels: [bool; 4],
+    chassis: bool,
 }
 
 /// Who a vehicle is.
@@ -145,24 +168,45 @@ impl Actor for Vehicle {
         self.rig.bodies()
     }
 
-    /// Throttle, brake, steering, whether reset was held, time until it works again.
+    /// Pedals and steering, whether reset was held, time until it works again, gear and shift, stunts.
     fn memory(&self) -> Memory {
         let [throttle, brake, steer] = self.response.to_array();
-        [throttle, brake, steer, f64::from(u8::from(self.reset_was_held)), self.reset_rest, 0.0, 0.0, 0.0]
+        let held = f64::from(u8::from(self.reset_was_held));
+        let [gear, shift] = self.drive_train.to_array();
+        let [boost, jump_held, jump_rest, lies, rights] = self.stunts.to_array();
+        let mut memory = Memory::default();
+        let known =
+            [throttle, brake, steer, held, self.reset_rest, gear, shift, boost, jump_held, jump_rest, lies, rights];
+        memory[..known.len()].copy_from_slice(&known);
+        memory
     }
 
     fn recall(&mut self, memory: &Memory) {
-        let [throttle, brake, steer, held, rest, ..] = *memory;
-        self.response = Response::from_array([throttle, brake, steer]);
+        let [throttle, brake, steer, held, rest, gear, shift, stunts @ ..] = *memory;
+        self.response = Pedals::from_array([throttle, brake, steer]);
         (self.reset_was_held, self.reset_rest) = (held != 0.0, rest);
+        self.drive_train = DriveTrain::from_array([gear, shift]);
+        let [boost, jump_held, jump_rest, lies, rights, ..] = stunts;
+        self.stunts = Stunts::from_array([boost, jump_held, jump_rest, lies, rights]);
     }
 
     fn control(&mut self, controls: Controls) {
         self.controls = controls.in_range();
     }
 
+    fn collide(&mut self, contact: &Contact) -> Response {
+        let part = self.rig.bodies().iter().position(|&body| contact.own.body == Some(body));
+        if contact.phase != Phase::End && !contact.other.is_sensor {
+            match part.and_then(|part| part.checked_sub(1)) {
+                Some(wheel) => self.touches.wheels[wheel] = true,
+                None => self.touches.chassis = true,
+            }
+        }
+        Response::Collide
+    }
+
     fn step(&mut self, step: &mut Step) -> Result<(), SimError> {
-        let chassis = self.bodies()[0];
+        let chassis = self.rig.chassis();
         let motion = Motion::of(step.world, chassis).ok_or(SimError::Gone { what: "the chassis" })?;
         if let Some(controls) = self.driver.decide(&motion, step.dt) {
             self.controls = controls;
@@ -170,11 +214,12 @@ impl Actor for Vehicle {
         self.reset_if_asked(step, &motion)?;
         let speed = motion.forward_speed();
         self.response.follow(&self.controls, &self.parameters, speed, step.dt);
-        for wheel in WHEELS {
-            let control = self.axle_control(wheel, speed);
-            step.world.set_axle(self.rig.axle(wheel), control)?;
-        }
-        Ok(())
+        self.move_wheels(step, speed)?;
+        self.drag(step, &motion)?;
+        let footing = self.footing(step.world);
+        let (rig, parameters, controls) = (&self.rig, &self.parameters, &self.controls);
+        let (world, dt, motion) = (&mut *step.world, step.dt, &motion);
+        self.stunts.act(Stage { world, rig, parameters, controls, motion, footing, dt })
     }
 
     fn when_lost(&self) -> WhenLost {
@@ -182,7 +227,7 @@ impl Actor for Vehicle {
     }
 
     fn place(&mut self, world: &mut World, pose: Pose) -> Result<(), SimError> {
-        self.response = Response::default();
+        (self.response, self.drive_train) = (Pedals::default(), DriveTrain::default());
         self.rig.place(world, pose)
     }
 }

@@ -1,24 +1,25 @@
 //! The numbers of a car: a small all-wheel-drive car of 1200 kg unless the arena's file says otherwise.
+//!
+//! Owns the keys of `[vehicle]` and their ranges: the body here, what it stands on in [`running_gear`], what drives it in
+//! [`drive_train`], what a cartoon car does besides in [`stunts`]. Numbers alone: what they do is the modules' of the
+//! vehicle.
 
+pub mod drive_train;
+pub mod running_gear;
+pub mod stunts;
+
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::rig::Wheel;
 use crate::arena_file::{ArenaError, Key};
+use drive_train::{DifferentialParameters, Drive, EngineParameters, GearboxParameters};
+use running_gear::{BrakeParameters, SteeringParameters, SuspensionParameters};
+use stunts::{AirControlParameters, BoostParameters, JumpParameters, SelfRightingParameters};
 
-/// Standard acceleration of gravity, m/s²; the static sag of the suspension is taken at it.
-const STANDARD_GRAVITY: f64 = 9.81;
+/// Standard acceleration of gravity, m/s²: what the static sag of the suspension and the grip of tyres are taken at.
+pub const STANDARD_GRAVITY: f64 = 9.81;
 
-/// Parameters of a vehicle; `[vehicle]` of an arena file.
-///
-/// Handling of the default car on flat asphalt (µ = 1), one step a tick, as `tests/game/handling.rs` holds it:
-///
-/// | | 30 Hz | 25 Hz | 480 Hz | closed form |
-/// |-|-|-|-|-|
-/// | 0 to 100 km/h, s | 5.27 | 5.28 | 5.27 | 5.21 + the pedal's 0.06: engine torque, then power |
-/// | braking from 20 m/s, m | 23.3 | 23.2 | 23.6 | 20.4 = v²/2µg; brakes stay 6 % below friction, the pedal takes 1.2 m |
-/// | turning radius at full lock, 3.5 m/s, m | 3.95 | 3.95 | 3.94 | 3.93: the wheels' geometry |
-/// | sideways at full lock from 15 m/s, m/s² | 7.53 | 7.53 | 7.52 | 7.5: [`steer_acceleration`](Self::steer_acceleration) |
-/// | after 25 s of full throttle, m/s | 50 | 50 | 50 | 50: [`top_speed`](Self::top_speed) |
+/// Parameters of a vehicle; `[vehicle]` of an arena file. How the default car handles is in `docs/VEHICLE.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct VehicleParameters {
@@ -44,38 +45,34 @@ pub struct VehicleParameters {
     pub wheel_rounding: f64,
     /// Coefficient of friction of a tyre.
     pub tyre_friction: f64,
-    /// Spring of one wheel, N/m.
-    pub suspension_stiffness: f64,
-    /// Damper of one wheel, N s/m.
-    pub suspension_damping: f64,
-    /// Which wheels the engine drives.
+    /// Force of the air over the speed squared, N s²/m².
+    pub drag: f64,
+    /// Driven wheels.
     pub drive: Drive,
-    /// Torque of the engine at full throttle, summed over the driven wheels, N m.
-    pub engine_torque: f64,
-    /// Power of the engine, W.
-    pub engine_power: f64,
-    /// Torque of the engine brake with the throttle released, summed over the driven wheels, N m.
-    pub coast_torque: f64,
     /// Speed that the engine strives for, m/s.
     pub top_speed: f64,
     /// The same backwards, m/s.
     pub reverse_speed: f64,
-    /// Driven wheels run at most so much faster than the car, m/s at the tyre.
-    pub launch_slip: f64,
-    /// Brake of one front wheel at full pedal, N m.
-    pub brake_torque_front: f64,
-    /// Brake of one rear wheel at full pedal, N m.
-    pub brake_torque_rear: f64,
-    /// Hand brake of one rear wheel, N m.
-    pub handbrake_torque: f64,
-    /// Time constant of the pedals, s.
-    pub pedal_time: f64,
-    /// Largest steering angle, deg.
-    pub steer_max_deg: f64,
-    /// Rate of the steering, deg/s.
-    pub steer_rate_deg: f64,
-    /// Steering is limited so that a car that follows its wheels is accelerated sideways at most so much, m/s².
-    pub steer_acceleration: f64,
+    /// Springs, dampers and anti-roll bars.
+    pub suspension: SuspensionParameters,
+    /// What the throttle gives.
+    pub engine: EngineParameters,
+    /// Gears.
+    pub gearbox: GearboxParameters,
+    /// What shares the torque between wheels.
+    pub differential: DifferentialParameters,
+    /// Brakes.
+    pub brakes: BrakeParameters,
+    /// Steering.
+    pub steering: SteeringParameters,
+    /// A push from behind.
+    pub boost: BoostParameters,
+    /// A jump from the wheels.
+    pub jump: JumpParameters,
+    /// Turning in the air.
+    pub air_control: AirControlParameters,
+    /// Getting up again.
+    pub self_righting: SelfRightingParameters,
 }
 
 impl Default for VehicleParameters {
@@ -92,51 +89,21 @@ impl Default for VehicleParameters {
             wheel_half_width: 0.12,
             wheel_rounding: 0.04,
             tyre_friction: 1.0,
-            suspension_stiffness: 40_000.0,
-            suspension_damping: 4_000.0,
+            drag: 0.4,
             drive: Drive::All,
-            engine_torque: 2_400.0,
-            engine_power: 150_000.0,
-            coast_torque: 150.0,
             top_speed: 50.0,
             reverse_speed: 8.0,
-            launch_slip: 2.0,
-            brake_torque_front: 1_400.0,
-            brake_torque_rear: 550.0,
-            handbrake_torque: 2_500.0,
-            pedal_time: 0.06,
-            steer_max_deg: 35.0,
-            steer_rate_deg: 120.0,
-            steer_acceleration: 7.5,
+            suspension: SuspensionParameters::default(),
+            engine: EngineParameters::default(),
+            gearbox: GearboxParameters::default(),
+            differential: DifferentialParameters::default(),
+            brakes: BrakeParameters::default(),
+            steering: SteeringParameters::default(),
+            boost: BoostParameters::default(),
+            jump: JumpParameters::default(),
+            air_control: AirControlParameters::default(),
+            self_righting: SelfRightingParameters::default(),
         }
-    }
-}
-
-/// Driven wheels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Drive {
-    /// Front wheels.
-    Front,
-    /// Rear wheels.
-    Rear,
-    /// All four.
-    All,
-}
-
-impl Drive {
-    /// Whether it drives `wheel`.
-    pub fn drives(self, wheel: Wheel) -> bool {
-        match self {
-            Self::Front => wheel.is_front(),
-            Self::Rear => !wheel.is_front(),
-            Self::All => true,
-        }
-    }
-
-    /// How many wheels it drives.
-    pub fn wheels(self) -> f64 {
-        if self == Self::All { 4.0 } else { 2.0 }
     }
 }
 
@@ -146,9 +113,27 @@ impl VehicleParameters {
         self.chassis_mass + 4.0 * self.wheel_mass
     }
 
+    /// Moments of inertia of the whole car about its own axes, its wheels being points at their hubs, kg m².
+    pub fn inertia(&self) -> DVec3 {
+        let of_box = |a: f64, b: f64| self.chassis_mass / 3.0 * (a * a + b * b);
+        let of_wheels = |a: f64, b: f64| 4.0 * self.wheel_mass * (a * a + b * b);
+        let [x, y, z] = self.chassis_half;
+        let (hub_x, hub_y, hub_z) = (0.5 * self.wheelbase, self.hub_height, 0.5 * self.track);
+        DVec3::new(
+            of_box(y, z) + of_wheels(hub_y, hub_z),
+            of_box(z, x) + of_wheels(hub_z, hub_x),
+            of_box(x, y) + of_wheels(hub_x, hub_y),
+        )
+    }
+
+    /// Moment of inertia of a wheel about its axle, kg m²; that of a cylinder.
+    pub fn wheel_inertia(&self) -> f64 {
+        0.5 * self.wheel_mass * self.wheel_radius * self.wheel_radius
+    }
+
     /// By how much the chassis presses the suspension at rest, m.
     pub fn static_sag(&self) -> f64 {
-        self.chassis_mass * STANDARD_GRAVITY / (4.0 * self.suspension_stiffness)
+        self.chassis_mass * STANDARD_GRAVITY / (4.0 * self.suspension.stiffness)
     }
 
     /// Height of the chassis's centre above flat ground at rest, m.
@@ -158,15 +143,16 @@ impl VehicleParameters {
 
     /// Largest steering angle at a forward speed in m/s, rad: v² tan δ / wheelbase is the acceleration sideways.
     pub fn steer_limit(&self, speed: f64) -> f64 {
-        let by_speed = (self.wheelbase * self.steer_acceleration / (speed * speed)).atan();
-        by_speed.min(self.steer_max_deg.to_radians())
+        let by_speed = (self.wheelbase * self.steering.acceleration / (speed * speed)).atan();
+        by_speed.min(self.steering.max_deg.to_radians())
     }
 
-    /// Angle of a front wheel at `z` m to the right of the middle, for the angle `steer` in the middle, rad (Ackermann:
-    /// all wheels turn about one point on the line of the rear axle).
+    /// Angle of a front wheel at `z` m to the right of the middle, for the angle `steer` in the middle, rad. At an Ackermann
+    /// ratio of 1 all wheels turn about one point on the line of the rear axle, at 0 the front wheels stay parallel.
     pub fn wheel_angle(&self, steer: f64, z: f64) -> f64 {
         let tan = steer.tan();
-        (self.wheelbase * tan / (self.wheelbase + z * tan)).atan()
+        let about_one_point = (self.wheelbase * tan / (self.wheelbase + z * tan)).atan();
+        steer + self.steering.ackermann * (about_one_point - steer)
     }
 
     /// # Errors
@@ -189,29 +175,25 @@ impl VehicleParameters {
         let rounding_max = 0.9 * self.wheel_half_width.min(self.wheel_radius);
         number("wheel_rounding", self.wheel_rounding, 0.0, rounding_max, "m")?;
         number("tyre_friction", self.tyre_friction, 0.0, 5.0, "")?;
-        number("suspension_stiffness", self.suspension_stiffness, 1e3, 1e7, "N/m")?;
-        number("suspension_damping", self.suspension_damping, 0.0, 1e6, "N s/m")?;
-        self.check_controls(key)
-    }
-
-    fn check_controls(&self, key: &Key) -> Result<(), ArenaError> {
-        let number =
-            |name: &str, value: f64, min: f64, max: f64, unit: &str| key.at(name).number(value, min, max, unit);
-        number("engine_torque", self.engine_torque, 0.0, 1e6, "N m")?;
-        number("engine_power", self.engine_power, 0.0, 1e8, "W")?;
-        number("coast_torque", self.coast_torque, 0.0, 1e6, "N m")?;
+        number("drag", self.drag, 0.0, 1e3, "N s^2/m^2")?;
         number("top_speed", self.top_speed, 0.0, 100.0, "m/s")?;
         number("reverse_speed", self.reverse_speed, 0.0, 100.0, "m/s")?;
-        number("launch_slip", self.launch_slip, 0.1, 100.0, "m/s")?;
-        number("brake_torque_front", self.brake_torque_front, 0.0, 1e6, "N m")?;
-        number("brake_torque_rear", self.brake_torque_rear, 0.0, 1e6, "N m")?;
-        number("handbrake_torque", self.handbrake_torque, 0.0, 1e6, "N m")?;
-        number("pedal_time", self.pedal_time, 0.0, 5.0, "s")?;
+        self.check_tables(key)
+    }
+
+    fn check_tables(&self, key: &Key) -> Result<(), ArenaError> {
+        self.suspension.check(&key.at("suspension"))?;
+        self.engine.check(&key.at("engine"))?;
+        self.gearbox.check(&key.at("gearbox"), &self.engine)?;
+        self.differential.check(&key.at("differential"))?;
+        self.brakes.check(&key.at("brakes"))?;
         // Ackermann's inner wheel stays well below a right angle.
         let steer_max = (1.8 * self.wheelbase / self.track).atan().to_degrees().min(60.0).floor();
-        number("steer_max_deg", self.steer_max_deg, 0.0, steer_max, "deg")?;
-        number("steer_rate_deg", self.steer_rate_deg, 1.0, 3_600.0, "deg/s")?;
-        number("steer_acceleration", self.steer_acceleration, 0.1, 100.0, "m/s^2")
+        self.steering.check(&key.at("steering"), steer_max)?;
+        self.boost.check(&key.at("boost"))?;
+        self.jump.check(&key.at("jump"))?;
+        self.air_control.check(&key.at("air_control"))?;
+        self.self_righting.check(&key.at("self_righting"))
     }
 }
 
@@ -222,15 +204,15 @@ mod tests {
     #[test]
     fn steering_is_limited_by_speed() {
         let p = VehicleParameters::default();
-        assert_eq!(p.steer_limit(0.0), p.steer_max_deg.to_radians());
+        assert_eq!(p.steer_limit(0.0), p.steering.max_deg.to_radians());
         let (speed, limit) = (30.0, p.steer_limit(30.0));
         let sideways = speed * speed * limit.tan() / p.wheelbase;
-        assert!((sideways - p.steer_acceleration).abs() < 1e-9, "{sideways}");
+        assert!((sideways - p.steering.acceleration).abs() < 1e-9, "{sideways}");
     }
 
     #[test]
     fn front_wheels_turn_about_one_point() {
-        let p = VehicleParameters::default();
+        let mut p = VehicleParameters::default();
         for steer in [0.5f64, -0.3, 0.01] {
             let radius = p.wheelbase / steer.tan();
             for z in [-0.8, 0.8] {
@@ -240,5 +222,7 @@ mod tests {
             }
         }
         assert_eq!(p.wheel_angle(0.0, 0.8), 0.0);
+        p.steering.ackermann = 0.0;
+        assert_eq!(p.wheel_angle(0.5, 0.8), 0.5);
     }
 }

@@ -8,23 +8,23 @@ const RELEASED: f64 = 0.02;
 
 /// Pedals and steering as they are now.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Response {
+pub struct Pedals {
     throttle: f64,
     brake: f64,
     steer: f64,
 }
 
-impl Response {
+impl Pedals {
     /// Moves towards `controls` over `dt` s: pedals as a first-order low-pass, the steering at a limited rate and within
     /// the angle that the forward speed `speed`, m/s, allows.
     pub fn follow(&mut self, controls: &Controls, p: &VehicleParameters, speed: f64, dt: f64) {
         // Implicit Euler of x' = (target − x) / time: stable for any dt.
-        let part = dt / (p.pedal_time + dt);
+        let part = dt / (p.steering.pedal_time + dt);
         self.throttle += part * (controls.throttle - self.throttle);
         self.brake += part * (controls.brake - self.brake);
         // Right is positive for a player, left for an angle about y.
         let wanted = -controls.steer * p.steer_limit(speed);
-        let change = p.steer_rate_deg.to_radians() * dt;
+        let change = p.steering.rate_deg.to_radians() * dt;
         self.steer += (wanted - self.steer).clamp(-change, change);
         if controls.throttle == 0.0 && self.throttle < RELEASED {
             self.throttle = 0.0;

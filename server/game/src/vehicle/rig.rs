@@ -1,7 +1,10 @@
 //! The bodies of a car and how they hang together.
 
-use glam::DVec3;
-use pita_sim::{AxleControl, AxleDesc, AxleId, BodyId, Collider, Material, RigidBodyDesc, Shape, SimError, World};
+use glam::{DQuat, DVec3};
+use pita_sim::{
+    AntiRollBarDesc, AxleControl, AxleDesc, AxleId, BodyId, Collider, Driven, Material, Motor, MotorDesc, MotorId,
+    RigidBodyDesc, Shape, SimError, World,
+};
 
 use super::VehicleParameters;
 use crate::Pose;
@@ -43,11 +46,22 @@ impl Wheel {
     }
 }
 
+/// How a wheel rolls.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Rolling {
+    /// Speed of its hub along its heading, m/s.
+    pub speed: f64,
+    /// Its turning against the chassis, rad/s; positive where it rolls forwards.
+    pub spin: f64,
+}
+
 /// Chassis, wheels and axles.
 pub struct Rig {
     /// Chassis, then [`WHEELS`].
     bodies: [BodyId; 5],
     axles: [AxleId; 4],
+    /// Between the wheels of the front, and the rear, axle.
+    clutches: [MotorId; 2],
     shapes: [Shape; 5],
     /// Centre of each body above the ground point of a pose, in the car's axes, m.
     rest: [DVec3; 5],
@@ -89,16 +103,24 @@ impl Rig {
                 chassis,
                 wheel: wheels[wheel as usize],
                 hub: wheel.hub(p),
-                stiffness: p.suspension_stiffness,
-                damping: p.suspension_damping,
+                stiffness: p.suspension.stiffness,
+                damping: p.suspension.damping,
                 control: AxleControl::default(),
             })
         };
         let [fl, fr, rl, rr] = WHEELS;
         let axles = [add_axle(fl)?, add_axle(fr)?, add_axle(rl)?, add_axle(rr)?];
+        let mut couple = |pair: [usize; 2], stiffness: f64| {
+            let pair = pair.map(|i| axles[i]);
+            if stiffness > 0.0 {
+                world.add_anti_roll_bar(AntiRollBarDesc { axles: pair, stiffness })?;
+            }
+            world.add_motor(MotorDesc { joint: Driven::Wheels(pair), motor: Motor::default() })
+        };
+        let clutches = [couple([0, 1], p.suspension.anti_roll_front)?, couple([2, 3], p.suspension.anti_roll_rear)?];
         let shapes = [chassis_shape, wheel_shape.clone(), wheel_shape.clone(), wheel_shape.clone(), wheel_shape];
         let [w1, w2, w3, w4] = wheels;
-        Ok(Self { bodies: [chassis, w1, w2, w3, w4], axles, shapes, rest })
+        Ok(Self { bodies: [chassis, w1, w2, w3, w4], axles, clutches, shapes, rest })
     }
 
     /// Chassis, then [`WHEELS`].
@@ -106,9 +128,47 @@ impl Rig {
         &self.bodies
     }
 
-    /// The axle of a wheel.
-    pub fn axle(&self, wheel: Wheel) -> AxleId {
-        self.axles[wheel as usize]
+    /// The chassis.
+    pub fn chassis(&self) -> BodyId {
+        self.bodies[0]
+    }
+
+    /// Steers, drives and brakes a wheel.
+    ///
+    /// # Errors
+    /// What the engine says.
+    pub fn set_axle(&self, world: &mut World, wheel: Wheel, control: AxleControl) -> Result<(), SimError> {
+        world.set_axle(self.axles[wheel as usize], control)
+    }
+
+    /// Sets the clutches between the wheels of the front, and the rear, axle.
+    ///
+    /// # Errors
+    /// What the engine says.
+    pub fn set_clutches(&self, world: &mut World, clutches: [Motor; 2]) -> Result<(), SimError> {
+        self.clutches.iter().zip(clutches).try_for_each(|(&id, motor)| world.set_motor(id, motor))
+    }
+
+    /// How a wheel rolls that is steered by `steer` rad; at rest where it is gone.
+    pub fn rolling(&self, world: &World, wheel: Wheel, steer: f64) -> Rolling {
+        let (chassis, wheel) = (self.chassis(), self.bodies[1 + wheel as usize]);
+        let turn = world.rotation(chassis).unwrap_or_default() * DQuat::from_rotation_y(steer);
+        let spins = |body| world.angular_velocity(body).unwrap_or_default();
+        Rolling {
+            speed: world.velocity(wheel).unwrap_or_default().dot(turn * DVec3::X),
+            spin: (spins(chassis) - spins(wheel)).dot(turn * DVec3::Z),
+        }
+    }
+
+    /// Gives the whole car the velocity `change`, m/s, within the coming tick.
+    ///
+    /// # Errors
+    /// What the engine says.
+    pub fn kick(&self, world: &mut World, change: DVec3, dt: f64) -> Result<(), SimError> {
+        self.bodies.iter().try_for_each(|&body| {
+            let (mass, at) = (world.mass(body).unwrap_or_default(), world.position(body).unwrap_or_default());
+            world.apply_force(body, change * (mass / dt), at)
+        })
     }
 
     /// Slices and shapes of the bodies.

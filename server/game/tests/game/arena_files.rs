@@ -129,7 +129,15 @@ const BAD_ADDITIONS: &[(&str, &[&str])] = &[
     ),
     ("[vehicle]\nchassis_mass = 0", &["vehicle.chassis_mass is 0", "50 to 50000 kg"]),
     ("[vehicle]\nwheel_rounding = 0.5", &["vehicle.wheel_rounding is 0.5", "0 to 0.108 m"]),
-    ("[vehicle]\ntrack = 5\nwheelbase = 1", &["vehicle.steer_max_deg is 35", "0 to 19 deg"]),
+    ("[vehicle]\ntrack = 5\nwheelbase = 1", &["vehicle.steering.max_deg is 35", "0 to 19 deg"]),
+    (
+        "[vehicle.engine]\ntorque = [[1000, 9], [1000, 9]]",
+        &["vehicle.engine.torque[1][0] is 1000", "1001 to 100000 rpm"],
+    ),
+    ("[vehicle.engine]\ntorque = []", &["vehicle.engine.torque is 0", "1 to 32 points"]),
+    ("[vehicle.gearbox]\nratios = [3, 3]", &["vehicle.gearbox.ratios[1] is 3", "0.05 to 2.99"]),
+    ("[vehicle.gearbox]\ndown_rpm = 6000", &["vehicle.gearbox.down_rpm is 6000", "0 to 4180 rpm"]),
+    ("[vehicle.differential]\nfront = \"shut\"", &["unknown variant `shut`", "`limited`"]),
     ("[vehicle]\nwings = 2", &["unknown field `wings`"]),
     ("[vehicle]\ndrive = \"sails\"", &["unknown variant `sails`", "`rear`"]),
     ("[[spawns]]\nposition = [0, nan, 0]", &["spawns[0].position[1] is NaN", "-20 to 1000 m"]),
@@ -189,13 +197,14 @@ fn settings_are_checked_too() {
 #[test]
 fn the_default_arena_explains_every_key_of_the_vehicle() {
     let all = toml::Table::try_from(VehicleParameters::default()).expect("plain numbers");
-    let section = Arena::DEFAULT.split("[vehicle]").nth(1).expect("there is one");
-    let section = section.split("# ---").next().expect("the first part");
+    let file: toml::Table = Arena::DEFAULT.parse().expect("it loads");
     for (key, value) in &all {
-        let line = section.lines().find(|line| line.split_whitespace().next() == Some(key));
-        let line = line.unwrap_or_else(|| panic!("{key} is not in the file"));
-        assert!(line.contains('#') && line.contains(':'), "{line} has no range");
-        let shipped: toml::Table = line.parse().expect("a line of the file that loads");
-        assert_eq!(shipped[key], *value, "{key} is said to be the default");
+        assert_eq!(file["vehicle"][key], *value, "{key} is said to be the default");
+    }
+    let start = Arena::DEFAULT.find("[vehicle]").expect("there is one");
+    let lines = Arena::DEFAULT[start..].lines().take_while(|line| !line.starts_with("# ---"));
+    for line in lines.filter(|line| line.contains(" = ")) {
+        let explained = line.split_once('#').is_some_and(|(_, comment)| comment.contains(':'));
+        assert!(explained, "{line} has no range");
     }
 }

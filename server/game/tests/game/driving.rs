@@ -50,7 +50,7 @@ fn reverse_drives_backwards_up_to_its_own_top_speed() {
 #[test]
 fn full_lock_at_walking_pace_turns_as_the_wheels_point() {
     let p = VehicleParameters::default();
-    let to_rear_axle = p.wheelbase / p.steer_max_deg.to_radians().tan();
+    let to_rear_axle = p.wheelbase / p.steering.max_deg.to_radians().tan();
     let expected = to_rear_axle.hypot(0.5 * p.wheelbase);
     for (steer, sign) in [(-1.0, 1.0), (1.0, -1.0)] {
         let mut track = TestTrack::with_parked_car();
@@ -120,7 +120,7 @@ fn a_ramp_is_climbed_and_the_landing_survived() {
 #[test]
 fn reset_puts_an_overturned_car_on_its_wheels_where_it_is() {
     let spawn = FLAT.replace("count = [8, 8]", "count = [1, 1]");
-    let roof = "\n[vehicle]\nsteer_acceleration = 100.0\ntyre_friction = 3.0\n";
+    let roof = "\n[vehicle]\ntyre_friction = 3.0\nsteering.acceleration = 100.0\nself_righting.hop = 0.0\n";
     let mut track = TestTrack::new(&format!("{spawn}{roof}"), SETTINGS);
     track.enter(0);
     track.tick();

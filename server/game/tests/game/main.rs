@@ -10,5 +10,6 @@ mod pipeline;
 mod players;
 mod rehearsals;
 mod reproducibility;
+mod stunts;
 mod test_track;
 mod tornado;

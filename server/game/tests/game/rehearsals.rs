@@ -22,7 +22,7 @@ impl Ports for Driven {
 }
 
 fn controls(tick: u64) -> Controls {
-    Controls { throttle: 0.8, steer: if tick % 60 < 30 { 0.4 } else { -0.2 }, ..Controls::default() }
+    Controls { throttle: 0.6, steer: if tick % 60 < 30 { 0.4 } else { -0.2 }, ..Controls::default() }
 }
 
 fn car(arena: &Arena) -> Vec<BodyState> {

@@ -2,7 +2,7 @@
 
 use pita_game::driver::Motion;
 use pita_game::{Arena, ArenaEvent, ArenaSettings, Command, Controls, Ports, Stage, pipeline};
-use pita_sim::{DQuat, DVec3, SliceView};
+use pita_sim::{BodyId, DQuat, DVec3, SimError, SliceView, World};
 
 /// Nothing but ground.
 pub const FLAT: &str = include_str!("../../../../configs/arenas/flat.toml");
@@ -115,12 +115,27 @@ impl TestTrack {
         self.part(slot, 0)
     }
 
+    /// Holds what `driver` says in slot 0 for `seconds`.
+    pub fn run_with(&mut self, seconds: f64, driver: impl Fn(&Self) -> Controls) {
+        for _ in 0..(seconds / self.dt).round() as usize {
+            let controls = driver(self);
+            self.drive(0, controls);
+            self.tick();
+        }
+    }
+
     /// Radius of the chassis's path, m, and yaw rate, rad/s, over two seconds with `controls` in slot 0.
     pub fn turn(&mut self, controls: Controls) -> (f64, f64) {
-        let ticks = (2.0 / self.dt).round();
+        self.turn_with(2.0, |_| controls)
+    }
+
+    /// The same over `seconds` with what `driver` says.
+    pub fn turn_with(&mut self, seconds: f64, driver: impl Fn(&Self) -> Controls) -> (f64, f64) {
+        let ticks = (seconds / self.dt).round();
         let (mut turned, mut way) = (0.0, 0.0);
         for _ in 0..ticks as usize {
             let before = self.car(0);
+            let controls = driver(self);
             self.drive(0, controls);
             self.tick();
             let after = self.car(0);
@@ -129,6 +144,61 @@ impl TestTrack {
             way += after.position.with_y(0.0).distance(before.position.with_y(0.0));
         }
         (way / turned.abs(), turned / (ticks * self.dt))
+    }
+
+    /// Changes bodies of the vehicle in `slot`, chassis first, from outside the game.
+    fn meddle(&mut self, slot: u16, meddle: impl Fn(&mut World, &[BodyId])) {
+        let slices: Vec<u32> = self.arena.actor_of(slot).expect("it is there").parts.iter().map(|p| p.slice).collect();
+        let world = self.arena.world();
+        let body = |slice: &u32| world.bodies().iter().copied().find(|&body| world.serial(body) == Some(*slice));
+        let bodies: Vec<BodyId> = slices.iter().filter_map(body).collect();
+        // Nothing is added: only this way leads to the world from here.
+        let nothing = self.arena.add_actor(|world, _| {
+            meddle(world, &bodies);
+            Err(SimError::Unusable { what: "nothing to add" })
+        });
+        assert!(nothing.is_err());
+    }
+
+    /// Puts the whole car to where its chassis is at `position`, turned by `turn`, with the velocity `velocity`.
+    pub fn place(&mut self, slot: u16, position: DVec3, turn: DQuat, velocity: DVec3) {
+        self.meddle(slot, |world, bodies| {
+            let (from, back) = (world.position(bodies[0]).unwrap(), world.rotation(bodies[0]).unwrap().inverse());
+            for &body in bodies {
+                let arm = turn * back * (world.position(body).unwrap() - from);
+                let rotation = turn * back * world.rotation(body).unwrap();
+                world.set_pose(body, position + arm, rotation).unwrap();
+                world.set_velocity(body, velocity, DVec3::ZERO).unwrap();
+            }
+        });
+    }
+
+    /// Gives the car a velocity, wheels that roll included, where it is.
+    pub fn push(&mut self, slot: u16, velocity: DVec3) {
+        self.meddle(slot, |world, bodies| {
+            for (part, &body) in bodies.iter().enumerate() {
+                let spin = if part == 0 { 0.0 } else { velocity.length() / 0.35 };
+                let axis = world.rotation(bodies[0]).unwrap() * DVec3::NEG_Z;
+                world.set_velocity(body, velocity, axis * spin).unwrap();
+            }
+        });
+    }
+
+    /// Turns the whole car about its chassis, rad/s.
+    pub fn spin(&mut self, slot: u16, spin: DVec3) {
+        self.meddle(slot, |world, bodies| {
+            let centre = world.position(bodies[0]).unwrap();
+            for &body in bodies {
+                let velocity = world.velocity(body).unwrap() + spin.cross(world.position(body).unwrap() - centre);
+                world.set_velocity(body, velocity, spin).unwrap();
+            }
+        });
+    }
+
+    /// Bodies that the engine took out of the world in the last tick.
+    pub fn quarantined(&self) -> usize {
+        let world = self.arena.world();
+        world.bodies().iter().filter(|&&body| world.is_quarantined(body)).count()
     }
 
     /// Speed over ground of the car in slot 0, m/s.
@@ -143,10 +213,22 @@ fn motion(slice: &SliceView) -> Motion {
     Motion { position: vector(slice.q), rotation, velocity: vector(slice.v) }
 }
 
+/// Nothing.
+pub const COAST: Controls = Controls {
+    throttle: 0.0,
+    brake: 0.0,
+    steer: 0.0,
+    reverse: false,
+    handbrake: false,
+    reset: false,
+    boost: false,
+    jump: false,
+    fire: false,
+    next_weapon: false,
+};
+
 /// Full throttle.
-pub const FULL_THROTTLE: Controls =
-    Controls { throttle: 1.0, brake: 0.0, steer: 0.0, reverse: false, handbrake: false, reset: false };
+pub const FULL_THROTTLE: Controls = Controls { throttle: 1.0, ..COAST };
 
 /// Full brake.
-pub const FULL_BRAKE: Controls =
-    Controls { throttle: 0.0, brake: 1.0, steer: 0.0, reverse: false, handbrake: false, reset: false };
+pub const FULL_BRAKE: Controls = Controls { brake: 1.0, ..COAST };
