@@ -8,7 +8,7 @@ mod playback;
 use std::{collections::VecDeque, time::Duration};
 
 use glam::{Quat, Vec3};
-use pita_protocol::dof::{Slice, kind};
+use pita_protocol::dof::{Group, Slice};
 
 pub(crate) use playback::Playback;
 
@@ -89,76 +89,94 @@ impl InterpolationBuffer {
         Some((self.frames.front()?.tick, self.frames.back()?.tick))
     }
 
-    /// The slices at a fractional tick, in order of id: interpolated between frames, carried on along Q' for a bounded
-    /// time after the newest, and those of the oldest before it. `None` while there is no frame.
+    /// The slices at a fractional tick, in order of id: between two of their states, carried on along Q' for a bounded
+    /// time after the newest, and as in the oldest frame before it. A frame that did not carry a body knows it by an older
+    /// state, which counts only once. `None` while there is no frame.
     pub fn sample(&self, tick: f64) -> Option<Vec<Slice>> {
         let after = self.frames.partition_point(|f| f.tick as f64 <= tick);
-        let (oldest, newest) = (self.frames.front()?, self.frames.back()?);
+        let oldest = self.frames.front()?;
         if after == 0 {
             return Some(oldest.slices.clone());
         }
-        if after == self.frames.len() {
-            let ticks = (tick - newest.tick as f64).clamp(0.0, self.extrapolation_max_ticks);
-            let seconds = (ticks * self.period_s) as f32;
-            return Some(newest.slices.iter().map(|slice| carried_on(slice, seconds)).collect());
+        let (present, later) = (&self.frames[after - 1], self.frames.range(after..));
+        let mut later: Vec<_> = later.map(|frame| frame.slices.as_slice()).collect();
+        Some(present.slices.iter().map(|from| self.shown(from, &mut later, tick)).collect())
+    }
+
+    /// `from` at `tick`. In `later` are the frames behind, in order, without what was passed already: ids ascend.
+    fn shown(&self, from: &Slice, later: &mut [&[Slice]], tick: f64) -> Slice {
+        let mut newer = None;
+        for frame in later {
+            *frame = &frame[frame.iter().position(|to| to.id >= from.id).unwrap_or(frame.len())..];
+            let Some(to) = frame.first().filter(|to| to.id == from.id) else {
+                // It is gone then.
+                return from.clone();
+            };
+            if to.tick > from.tick {
+                newer = Some(to);
+                break;
+            }
         }
-        let (a, b) = (&self.frames[after - 1], &self.frames[after]);
-        let t = (tick - a.tick as f64) / (b.tick as f64 - a.tick as f64);
-        Some(between(&a.slices, &b.slices, t as f32))
+        match newer {
+            Some(to) if to.kind == from.kind && to.groups == from.groups => {
+                interpolated(from, to, ((tick - from.tick as f64) / (to.tick - from.tick) as f64) as f32)
+            }
+            Some(_) => from.clone(),
+            None => {
+                let ticks = (tick - from.tick as f64).clamp(0.0, self.extrapolation_max_ticks);
+                carried_on(from, (ticks * self.period_s) as f32)
+            }
+        }
     }
 }
 
-/// Slices of `a`, moved by the fraction `t` towards their state in `b`. One that `b` lacks stays as it was; one that
-/// only `b` has is not there yet. Both lists ascend by id.
-fn between(a: &[Slice], b: &[Slice], t: f32) -> Vec<Slice> {
-    let mut later = b.iter().peekable();
-    let moved = a.iter().map(|from| {
-        while later.next_if(|to| to.id < from.id).is_some() {}
-        match later.peek() {
-            Some(to) if to.id == from.id && to.kind == from.kind && to.q.len() == from.q.len() => {
-                interpolated(from, to, t)
-            }
-            _ => from.clone(),
-        }
-    });
-    moved.collect()
-}
-
+/// The slice moved by the fraction `t` towards its state in `b`, which has the same groups.
 fn interpolated(a: &Slice, b: &Slice, t: f32) -> Slice {
     // Not a + t (b − a): the difference of two finite numbers may overflow, and their mean by rounding.
     let mix = |(&a, &b): (&f32, &f32)| (a * (1.0 - t) + b * t).clamp(f32::MIN, f32::MAX);
     let mut q: Vec<f32> = a.q.iter().zip(&b.q).map(mix).collect();
-    if let (Some(from), Some(to)) = (rotation(a), rotation(b)) {
-        q[3..7].copy_from_slice(&from.slerp(to, t).normalize().to_array());
+    for (_, at, _) in places(a).filter(|(group, ..)| *group == Group::Rotation) {
+        if let (Some(from), Some(to), Some(shown)) = (a.q.get(at..at + 4), b.q.get(at..at + 4), q.get_mut(at..at + 4)) {
+            shown.copy_from_slice(&rotation(from).slerp(rotation(to), t).normalize().to_array());
+        }
     }
     // Q' is constant within a tick, and it is the later state's Q' that led there.
-    Slice { id: a.id, kind: a.kind, q, v: b.v.clone() }
+    Slice { q, v: b.v.clone(), ..a.clone() }
 }
 
 fn carried_on(slice: &Slice, seconds: f32) -> Slice {
     let mut moved = slice.clone();
-    let positions = if slice.kind == kind::RIGID_BODY { 3 } else { slice.q.len() };
-    for (q, v) in moved.q.iter_mut().zip(&slice.v).take(positions) {
-        *q = (*q + v * seconds).clamp(f32::MIN, f32::MAX);
-    }
-    if let (Some(rotation), Some(spin)) = (rotation(slice), slice.v.get(3..6)) {
-        let turn = Quat::from_scaled_axis(Vec3::from_slice(spin) * seconds);
-        let turned = (turn * rotation).normalize();
-        if turned.is_finite() {
-            moved.q[3..7].copy_from_slice(&turned.to_array());
+    for (group, at, rate) in places(slice) {
+        let (numbers, components) = (group.numbers(), group.components());
+        let (Some(q), Some(v)) = (moved.q.get_mut(at..at + numbers), slice.v.get(rate..rate + components)) else {
+            break;
+        };
+        if group == Group::Rotation {
+            let turn = Quat::from_scaled_axis(Vec3::from_slice(v) * seconds);
+            let turned = (turn * rotation(q)).normalize();
+            if turned.is_finite() {
+                q.copy_from_slice(&turned.to_array());
+            }
+        } else {
+            q.iter_mut().zip(v).for_each(|(q, v)| *q = (*q + v * seconds).clamp(f32::MIN, f32::MAX));
         }
     }
     moved
 }
 
-/// Unit quaternion of a rigid body; the identity where the numbers are none.
-fn rotation(slice: &Slice) -> Option<Quat> {
-    if slice.kind != kind::RIGID_BODY {
-        return None;
-    }
-    let numbers = slice.q.get(3..7)?;
+/// The groups of a slice, each with where its numbers start in Q and in Q'.
+fn places(slice: &Slice) -> impl Iterator<Item = (Group, usize, usize)> {
+    slice.groups.iter().scan((0, 0), |(q, v), &group| {
+        let place = (group, *q, *v);
+        (*q, *v) = (*q + group.numbers(), *v + group.components());
+        Some(place)
+    })
+}
+
+/// Unit quaternion of four numbers; the identity where they are none.
+fn rotation(numbers: &[f32]) -> Quat {
     let unit = Quat::from_slice(numbers).normalize();
-    Some(if unit.is_finite() && unit.is_normalized() { unit } else { Quat::IDENTITY })
+    if unit.is_finite() && unit.is_normalized() { unit } else { Quat::IDENTITY }
 }
 
 #[cfg(test)]

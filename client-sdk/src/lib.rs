@@ -23,6 +23,7 @@ mod interpolation;
 mod join;
 mod keeper;
 mod lock;
+mod mount;
 mod outbox;
 #[cfg(feature = "prediction")]
 mod prediction;
@@ -41,10 +42,13 @@ pub use conditioner::{ConditionerSettings, Conditions, ConditionsError, Freeze};
 pub use error::{ClientError, SessionEnd};
 pub use events::SessionEvent;
 pub use interpolation::{Frame, InterpolationBuffer, InterpolationSettings};
+pub use mount::{Pose, part_pose, part_vertices};
 pub use roster::Roster;
 pub use session::{Session, WorldState};
 pub use snapshot::ReceivedSnapshot;
 pub use statistics::{Durations, Statistics};
 
 pub use pita_protocol::dof::Slice;
-pub use pita_protocol::message::{ActorDescription, Controls, Description, Event, InputAck, InputFate, buttons};
+pub use pita_protocol::message::{
+    ActorDescription, Controls, Description, Event, InputAck, InputFate, PartDescription, buttons,
+};

@@ -10,8 +10,8 @@ use std::{collections::VecDeque, time::Duration};
 use glam::{DQuat, DVec3};
 use pita_game::{ArenaSettings, BodyState, CarState, Controls as GameControls, Rehearsal};
 use pita_protocol::{
-    dof::{Slice, kind},
-    message::{Controls, buttons},
+    dof::{Group, Slice, kind},
+    message::Controls,
 };
 
 /// Ticks that are kept: more than any lead; a prediction further ahead than that begins anew.
@@ -127,7 +127,7 @@ impl Predictor {
         let bodies: Vec<BodyState> = bodies.collect();
         let pivot = bodies.first()?.position;
         let mut shown: Vec<Slice> =
-            self.slices.iter().zip(&bodies).map(|(&id, body)| self.shown(id, body, pivot)).collect();
+            self.slices.iter().zip(&bodies).map(|(&id, body)| self.shown(id, body, to.tick, pivot)).collect();
         shown.sort_unstable_by_key(|slice| slice.id);
         Some(shown)
     }
@@ -169,12 +169,13 @@ impl Predictor {
         }
     }
 
-    fn shown(&self, id: u32, body: &BodyState, pivot: DVec3) -> Slice {
+    fn shown(&self, id: u32, body: &BodyState, tick: u64, pivot: DVec3) -> Slice {
         let position = pivot + self.offset + self.turn * (body.position - pivot);
         let rotation = self.turn * body.rotation;
         let q = position.as_vec3().to_array().into_iter().chain(rotation.as_quat().to_array()).collect();
         let v = body.velocity.as_vec3().to_array().into_iter().chain(body.angular_velocity.as_vec3().to_array());
-        Slice { id, kind: kind::RIGID_BODY, q, v: v.collect() }
+        let groups = vec![Group::Point, Group::Rotation];
+        Slice { id, kind: kind::RIGID_BODY, tick, groups, q, v: v.collect() }
     }
 }
 
@@ -228,20 +229,8 @@ pub fn body_state(slice: &Slice) -> Option<BodyState> {
     rotation.is_finite().then_some(BodyState { position, rotation, velocity, angular_velocity })
 }
 
-fn to_game(controls: &Controls) -> GameControls {
-    let pressed = |button| controls.buttons & button != 0;
-    GameControls {
-        throttle: controls.throttle.into(),
-        brake: controls.brake.into(),
-        steer: controls.steer.into(),
-        reverse: pressed(buttons::REVERSE),
-        handbrake: pressed(buttons::HANDBRAKE),
-        reset: pressed(buttons::RESET),
-        boost: pressed(buttons::BOOST),
-        jump: pressed(buttons::JUMP),
-        fire: pressed(buttons::FIRE),
-        next_weapon: pressed(buttons::NEXT_WEAPON),
-    }
+fn to_game(&Controls { throttle, brake, steer, buttons }: &Controls) -> GameControls {
+    GameControls::from_input([throttle, brake, steer], buttons)
 }
 
 #[cfg(test)]

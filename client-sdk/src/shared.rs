@@ -141,10 +141,11 @@ impl Shared {
     }
 }
 
-/// The bodies of `slices`, in that order; `None` where the snapshot lacks one.
+/// The bodies of `slices`, in that order; `None` where the snapshot does not carry one.
 #[cfg(feature = "prediction")]
 fn own_bodies(snapshot: &ReceivedSnapshot, slices: &[u32]) -> Option<Vec<pita_game::BodyState>> {
-    let bodies: Vec<_> = snapshot.select(slices).iter().filter_map(body_state).collect();
+    let slices_now = snapshot.select(slices).into_iter().filter(|slice| slice.tick == snapshot.tick());
+    let bodies: Vec<_> = slices_now.filter_map(|slice| body_state(&slice)).collect();
     (bodies.len() == slices.len()).then_some(bodies)
 }
 

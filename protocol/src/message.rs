@@ -6,6 +6,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::codec::{Message, WireError, require};
+pub use crate::description::{
+    ActorDescription, ChainJoint, Description, JointMotion, Mount, MountNode, PartDescription, Shape,
+    StaticDescription, Vertex,
+};
 pub use crate::input::{
     Controls, FATES_MAX, INPUT_FRAMES_MAX, InputAck, InputCounts, InputFate, InputFates, InputFrame, InputPacket,
     buttons,
@@ -147,139 +151,6 @@ impl Message for JoinReply {
     }
 }
 
-// --- what there is -------------------------------------------------------------------------------------------------
-
-/// What the numbers of the snapshots belong to.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Description {
-    /// Name of the arena, as in the key expressions.
-    pub arena: String,
-    /// What a person calls it.
-    pub title: String,
-    /// Tick at which this was true.
-    pub tick: u64,
-    /// Number of the last event that is contained in it.
-    pub event_sequence: u32,
-    /// Acceleration, m/s².
-    pub gravity: [f32; 3],
-    /// Geometry that never moves.
-    pub statics: Vec<StaticDescription>,
-    /// Everything that has game logic, in order of id.
-    pub actors: Vec<ActorDescription>,
-}
-
-/// A piece of static geometry.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StaticDescription {
-    /// Its shape.
-    pub shape: Shape,
-    /// Where it stands, m.
-    pub position: [f32; 3],
-    /// Unit quaternion x y z w, shape to world.
-    pub rotation: [f32; 4],
-}
-
-/// An actor and the slices that it consists of.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ActorDescription {
-    /// Identifies the actor for as long as it lives; never used twice in a run.
-    pub id: u32,
-    /// `vehicle`, `crate`, ...
-    pub kind: String,
-    /// What a person calls it; the player's name for a player's vehicle.
-    pub name: String,
-    /// Slot of the session that drives it.
-    pub slot: Option<u16>,
-    /// Its parts; the first is the one that says where the actor is.
-    pub parts: Vec<PartDescription>,
-}
-
-/// A slice with a shape.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PartDescription {
-    /// [`Slice::id`](crate::dof::Slice::id) in the snapshots.
-    pub slice: u32,
-    /// Shape in the slice's frame.
-    pub shape: Shape,
-}
-
-/// Shapes, metres, in their own frame.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Shape {
-    /// Everything below the plane through the origin.
-    HalfSpace {
-        /// Unit normal, points out of the ground.
-        normal: [f32; 3],
-    },
-    /// Ball around the origin.
-    Ball {
-        /// Radius.
-        radius: f32,
-    },
-    /// Box around the origin.
-    Box {
-        /// Half extents.
-        half: [f32; 3],
-    },
-    /// Segment along x, spherically extruded.
-    Capsule {
-        /// Half length of the segment.
-        half_length: f32,
-        /// Radius.
-        radius: f32,
-    },
-    /// Cylinder along z, its edges rounded.
-    Cylinder {
-        /// Half length along z.
-        half_length: f32,
-        /// Radius.
-        radius: f32,
-        /// Radius of the rounded edge, contained in the other two.
-        rounding: f32,
-    },
-    /// Convex hull, spherically extruded.
-    Hull {
-        /// Its vertices.
-        points: Vec<[f32; 3]>,
-        /// Extrusion radius.
-        radius: f32,
-    },
-}
-
-impl Message for Description {
-    const KIND: u8 = 3;
-    const MAX_BYTES: usize = 2 << 20;
-    fn validate(&self) -> Result<(), WireError> {
-        let poses = self.statics.iter().all(|s| all_finite(&s.position) && all_finite(&s.rotation));
-        require(poses && all_finite(&self.gravity), "description numbers", "finite")?;
-        let parts = self.actors.iter().flat_map(|a| a.parts.iter().map(|p| &p.shape));
-        let shapes = self.statics.iter().map(|s| &s.shape).chain(parts);
-        require(shapes.into_iter().all(Shape::is_sane), "shape", "finite, no negative size, at most 256 points")?;
-        let texts = self.actors.iter().flat_map(|a| [&a.kind, &a.name]).chain([&self.arena, &self.title]);
-        require(texts.into_iter().all(|t| t.len() <= TEXT_MAX), "text", "at most 256 bytes")
-    }
-}
-
-impl Shape {
-    fn is_sane(&self) -> bool {
-        let size = |x: f32| x.is_finite() && x >= 0.0;
-        match self {
-            Self::HalfSpace { normal } => all_finite(normal),
-            Self::Ball { radius } => size(*radius),
-            Self::Box { half } => half.iter().all(|&x| size(x)),
-            Self::Capsule { half_length, radius } => size(*half_length) && size(*radius),
-            Self::Cylinder { half_length, radius, rounding } => size(*half_length) && size(*radius) && size(*rounding),
-            Self::Hull { points, radius } => {
-                points.len() <= 256 && points.iter().all(|p| all_finite(p)) && size(*radius)
-            }
-        }
-    }
-}
-
-fn all_finite(numbers: &[f32]) -> bool {
-    numbers.iter().all(|x| x.is_finite())
-}
-
 // --- what happens --------------------------------------------------------------------------------------------------
 
 /// Put on [`snapshot`](crate::Keys::snapshot) after each tick.
@@ -353,12 +224,7 @@ impl Message for EventMessage {
     const MAX_BYTES: usize = 64 << 10;
     fn validate(&self) -> Result<(), WireError> {
         match &self.event {
-            Event::ActorAdded(actor) => {
-                let texts = actor.kind.len() <= TEXT_MAX && actor.name.len() <= TEXT_MAX;
-                require(texts, "text", "at most 256 bytes")?;
-                let shapes = actor.parts.iter().all(|p| p.shape.is_sane());
-                require(shapes, "shape", "finite, no negative size, at most 256 points")
-            }
+            Event::ActorAdded(actor) => actor.validate(),
             Event::Joined { name: text, .. } | Event::Left { reason: text, .. } | Event::Closing { reason: text } => {
                 require(text.len() <= TEXT_MAX, "text", "at most 256 bytes")
             }

@@ -60,6 +60,9 @@ pub enum DaemonError {
     /// The operating system gives no thread or no signals.
     #[error("cannot start: {0}")]
     System(#[from] std::io::Error),
+    /// Clients could not be told what there is.
+    #[error("{0}")]
+    Undescribable(String),
     /// A thread ended that should not have.
     #[error("the {0} thread ended unexpectedly; what it said is above")]
     ThreadEnded(&'static str),
@@ -137,6 +140,8 @@ fn run_arena(Configured { config, arena, source }: Configured, clock: Clock, out
 fn share(config: &ServerConfig, arena: &Arena, source: String, clock: Clock) -> Result<Shared, DaemonError> {
     let name_error = |reason| DaemonError::ArenaName { name: arena.name().to_owned(), reason };
     let limits = config.sessions;
+    let description = description::describe(arena);
+    description::check(&description).map_err(DaemonError::Undescribable)?;
     // Ranges of the configuration are within u16.
     let players = arena.max_players().min(limits.players_max.get() as u16);
     let inputs = limits.inputs_per_tick_max.get();
@@ -156,7 +161,7 @@ fn share(config: &ServerConfig, arena: &Arena, source: String, clock: Clock) -> 
             },
             &config.bans.names,
         ),
-        description: description::describe(arena),
+        description,
         source: ArenaSource { toml: source },
     }))
 }

@@ -3,14 +3,18 @@
 //! Owns the translation from the game's types to the protocol's and the description that clients join with, kept up to
 //! date by events.
 
-use glam::{DQuat, DVec3};
+mod parts;
+
 use pita_game::{ActorInfo, Arena};
-use pita_protocol::message::{ActorDescription, Description, Event, PartDescription, Shape, StaticDescription};
+use pita_protocol::Message;
+use pita_protocol::message::{ActorDescription, Description, Event, EventMessage, StaticDescription};
+
+use parts::{parts, quaternion, shapes, vector};
 
 /// `arena` as it is now; the description's events begin at 0.
 pub fn describe(arena: &Arena) -> Description {
     let of_static = |info: &pita_game::StaticInfo| {
-        let (position, rotation) = (vector(info.position), rotation(info.rotation));
+        let (position, rotation) = (vector(info.position), quaternion(info.rotation));
         shapes(&info.shape).into_iter().map(move |shape| StaticDescription { shape, position, rotation })
     };
     Description {
@@ -26,17 +30,55 @@ pub fn describe(arena: &Arena) -> Description {
 
 /// An actor in the words of the wire.
 pub fn actor(info: &ActorInfo) -> ActorDescription {
-    let part = |part: &pita_game::PartInfo| {
-        let slice = part.slice;
-        shapes(&part.shape).into_iter().map(move |shape| PartDescription { slice, shape })
-    };
     ActorDescription {
         id: info.id,
         kind: info.kind.to_owned(),
         name: info.name.clone(),
         slot: info.slot,
-        parts: info.parts.iter().flat_map(part).collect(),
+        parts: info.parts.iter().flat_map(parts).collect(),
     }
+}
+
+/// The same for an event: an actor that is too large for one comes without its parts, which is said in the log.
+pub fn bounded_actor(info: &ActorInfo) -> ActorDescription {
+    let actor = actor(info);
+    match check_actor(&actor) {
+        Ok(()) => actor,
+        Err(reason) => {
+            tracing::error!("{reason}; clients do not see it");
+            ActorDescription { parts: Vec::new(), ..actor }
+        }
+    }
+}
+
+/// What is wrong with an arena that cannot be described to those who join, in words for a person.
+///
+/// # Errors
+/// That text.
+pub fn check(description: &Description) -> Result<(), String> {
+    description.actors.iter().try_for_each(check_actor)?;
+    let (bytes, most) = (pita_protocol::encode(description).len(), Description::MAX_BYTES);
+    if bytes <= most {
+        return Ok(());
+    }
+    let (statics, actors) = (description.statics.len(), description.actors.len());
+    Err(format!(
+        "the arena takes {bytes} bytes to describe, at most {most} are allowed: it has {statics} pieces of static \
+         geometry and {actors} actors; use fewer, or simpler shapes"
+    ))
+}
+
+fn check_actor(actor: &ActorDescription) -> Result<(), String> {
+    let event = EventMessage { sequence: u32::MAX, tick: u64::MAX, event: Event::ActorAdded(actor.clone()) };
+    let (bytes, most) = (pita_protocol::encode(&event).len(), EventMessage::MAX_BYTES);
+    if bytes <= most {
+        return Ok(());
+    }
+    let ActorDescription { id, kind, name, .. } = actor;
+    Err(format!(
+        "actor {id} ({kind} {name:?}) takes {bytes} bytes to describe, at most {most} are allowed: give it fewer or \
+         simpler parts"
+    ))
 }
 
 /// Makes `description` contain `event`, which has the number `sequence` and happened at `tick`.
@@ -61,37 +103,6 @@ pub fn apply(description: &mut Description, event: &Event, sequence: u32, tick: 
 /// The actor that the session on `slot` drives.
 pub fn actor_of(description: &Description, slot: u16) -> Option<u32> {
     description.actors.iter().find(|actor| actor.slot == Some(slot)).map(|actor| actor.id)
-}
-
-/// A shape in the words of the wire: a surface is a hull for each of its triangles.
-fn shapes(shape: &pita_sim::Shape) -> Vec<Shape> {
-    let shape = match shape {
-        pita_sim::Shape::Mesh(mesh) => {
-            let points = |triangle: &[u32; 3]| triangle.map(|corner| vector(mesh.vertices()[corner as usize])).to_vec();
-            return mesh.triangles().iter().map(|t| Shape::Hull { points: points(t), radius: 0.0 }).collect();
-        }
-        pita_sim::Shape::HalfSpace { normal } => Shape::HalfSpace { normal: vector(*normal) },
-        pita_sim::Shape::Ball { radius } => Shape::Ball { radius: *radius as f32 },
-        pita_sim::Shape::Box { half } => Shape::Box { half: vector(*half) },
-        pita_sim::Shape::Capsule { half_length, radius } => {
-            Shape::Capsule { half_length: *half_length as f32, radius: *radius as f32 }
-        }
-        pita_sim::Shape::Cylinder { half_length, radius, rounding } => {
-            Shape::Cylinder { half_length: *half_length as f32, radius: *radius as f32, rounding: *rounding as f32 }
-        }
-        pita_sim::Shape::Hull { points, radius } => {
-            Shape::Hull { points: points.iter().copied().map(vector).collect(), radius: *radius as f32 }
-        }
-    };
-    vec![shape]
-}
-
-fn vector(v: DVec3) -> [f32; 3] {
-    v.as_vec3().to_array()
-}
-
-fn rotation(q: DQuat) -> [f32; 4] {
-    q.as_quat().to_array()
 }
 
 #[cfg(test)]

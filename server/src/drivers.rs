@@ -119,7 +119,8 @@ impl Drivers {
             if now.tick.saturating_sub(seat.heard_tick) >= self.coast_after_ticks {
                 seat.controls = Controls::default();
             }
-            let mut controls = to_game(&seat.controls);
+            let Controls { throttle, brake, steer, buttons } = seat.controls;
+            let mut controls = GameControls::from_input([throttle, brake, steer], buttons);
             controls.reset |= std::mem::take(&mut seat.reset_pressed);
             into.push(Command::Drive { slot, controls });
             seat.controls.buttons &= !buttons::RESET;
@@ -206,21 +207,13 @@ impl Seat {
     }
 }
 
-fn to_game(controls: &Controls) -> GameControls {
-    let pressed = |button| controls.buttons & button != 0;
-    GameControls {
-        throttle: controls.throttle.into(),
-        brake: controls.brake.into(),
-        steer: controls.steer.into(),
-        reverse: pressed(buttons::REVERSE),
-        handbrake: pressed(buttons::HANDBRAKE),
-        reset: pressed(buttons::RESET),
-        boost: pressed(buttons::BOOST),
-        jump: pressed(buttons::JUMP),
-        fire: pressed(buttons::FIRE),
-        next_weapon: pressed(buttons::NEXT_WEAPON),
-    }
-}
+/// The game reads buttons as the wire numbers them.
+const _: () = {
+    use pita_game::controls::buttons as game;
+    assert!(buttons::REVERSE == game::REVERSE && buttons::HANDBRAKE == game::HANDBRAKE);
+    assert!(buttons::RESET == game::RESET && buttons::BOOST == game::BOOST && buttons::JUMP == game::JUMP);
+    assert!(buttons::FIRE == game::FIRE && buttons::NEXT_WEAPON == game::NEXT_WEAPON);
+};
 
 #[cfg(test)]
 mod tests;

@@ -5,10 +5,10 @@
 //! where no frame is free, the tick leaves none.
 
 use crossbeam_queue::ArrayQueue;
-use pita_game::{Arena, ArenaEvent};
-use pita_protocol::dof::{Group, State, kind, relative};
+use pita_game::{ActorInfo, ArenaEvent};
+use pita_protocol::dof::{BODY_GROUPS_MAX, Group, State, kind, relative};
 use pita_protocol::message::{InputAck, InputCounts, TickRecord};
-use pita_sim::DofKind;
+use pita_sim::{BlockSize, DofKind, World};
 
 use crate::sessions::SessionId;
 
@@ -59,6 +59,8 @@ pub struct Totals {
 #[derive(Default)]
 struct Dof {
     heads: Vec<SliceHead>,
+    /// What the numbers are, slice by slice.
+    layouts: Vec<Group>,
     numbers: Vec<f64>,
     /// Parts of actors with the first part of each.
     attached: Vec<(u32, u32)>,
@@ -68,24 +70,36 @@ struct Dof {
 struct SliceHead {
     id: u32,
     kind: u8,
+    groups: Span,
+    numbers: Span,
+}
+
+/// Where a slice's share of a list is.
+#[derive(Clone, Copy)]
+struct Span {
     start: u32,
+    len: u32,
+}
+
+impl Span {
+    fn of<T>(self, list: &[T]) -> &[T] {
+        &list[self.start as usize..][..self.len as usize]
+    }
 }
 
 impl Frame {
-    /// Copies the state of `arena`; events, records and acknowledgements are the caller's.
-    pub fn copy_state(&mut self, arena: &Arena) {
-        let world = arena.world();
+    /// Copies the state of `world`, in which `actors` are; events, records and acknowledgements are the caller's.
+    pub fn copy_state<'a>(&mut self, world: &World, actors: impl Iterator<Item = &'a ActorInfo>) {
         self.state_hash = world.state_hash();
         self.bodies = u32::try_from(world.body_count()).unwrap_or(u32::MAX);
         self.dof.clear();
         for slice in world.slices() {
-            if let Some(kind) = kind_on_wire(slice.kind) {
-                self.dof.push(slice.serial, kind, slice.q);
-            }
+            self.dof.push(slice.serial, kind_on_wire(slice.kind), slice.blocks, slice.q);
         }
-        for actor in arena.actors() {
+        for actor in actors {
             if let Some((first, others)) = actor.parts.split_first() {
-                self.dof.attached.extend(others.iter().map(|part| (part.slice, first.slice)));
+                let others = others.iter().filter(|part| part.slice != first.slice);
+                self.dof.attached.extend(others.map(|part| (part.slice, first.slice)));
             }
         }
     }
@@ -106,13 +120,21 @@ impl Frame {
 impl Dof {
     fn clear(&mut self) {
         self.heads.clear();
+        self.layouts.clear();
         self.numbers.clear();
         self.attached.clear();
     }
 
-    fn push(&mut self, id: u32, kind: u8, q: &[f64]) {
-        let start = self.numbers.len() as u32;
-        self.heads.push(SliceHead { id, kind, start });
+    /// A slice of more groups than a body may have on the wire is left out: nobody sees it.
+    fn push(&mut self, id: u32, kind: u8, blocks: &[BlockSize], q: &[f64]) {
+        let (groups, numbers) = (self.layouts.len(), self.numbers.len());
+        blocks.iter().for_each(|block| self.layouts.extend(groups_of(kind, *block)));
+        let len = self.layouts.len() - groups;
+        if !(1..=BODY_GROUPS_MAX).contains(&len) {
+            return self.layouts.truncate(groups);
+        }
+        let span = |start: usize, len: usize| Span { start: start as u32, len: len as u32 };
+        self.heads.push(SliceHead { id, kind, groups: span(groups, len), numbers: span(numbers, q.len()) });
         self.numbers.extend_from_slice(q);
     }
 
@@ -124,7 +146,7 @@ impl Dof {
             let parent = self.parent(head);
             let q = self.q(head);
             let seen = parent.map(|parent| relative(self.q(parent), q));
-            let (layout, q) = (layout_of(head.kind), seen.as_ref().map_or(q, |seen| &seen[..]));
+            let (layout, q) = (head.groups.of(&self.layouts), seen.as_ref().map_or(q, |seen| &seen[..]));
             let pushed = into.push(head.id, head.kind, parent.map(|parent| parent.id), layout, q);
             // A world of more bodies than a stream may have shows its oldest.
             if pushed.is_err() {
@@ -143,22 +165,31 @@ impl Dof {
     }
 
     fn q(&self, head: &SliceHead) -> &[f64] {
-        let count: usize = layout_of(head.kind).iter().map(|group| group.numbers()).sum();
-        &self.numbers[head.start as usize..][..count]
+        head.numbers.of(&self.numbers)
     }
 }
 
-/// The groups of the kinds that [`kind_on_wire`] knows.
-fn layout_of(kind: u8) -> &'static [Group] {
-    if kind == kind::PARTICLE { &[Group::Point] } else { &[Group::Point, Group::Rotation] }
+/// The groups of a block of coordinates. Three numbers are a point, but of a game's own kind they may be anything.
+fn groups_of(kind: u8, block: BlockSize) -> impl Iterator<Item = Group> {
+    let (groups, scalars): (&[Group], usize) = match (block.positions, block.rates) {
+        (3, 3) if kind != kind::OWN => (&[Group::Point][..], 0),
+        (4, 3) => (&[Group::Rotation][..], 0),
+        (7, 6) => (&[Group::Point, Group::Rotation][..], 0),
+        (positions, _) => (&[][..], usize::from(positions)),
+    };
+    groups.iter().copied().chain(std::iter::repeat_n(Group::Scalar, scalars))
 }
 
-/// What the wire calls a kind; `None` for those that it does not carry yet, which no arena has.
-fn kind_on_wire(kind: DofKind) -> Option<u8> {
+/// What the wire calls a kind.
+fn kind_on_wire(kind: DofKind) -> u8 {
     match kind {
-        DofKind::Particle => Some(kind::PARTICLE),
-        DofKind::RigidBody => Some(kind::RIGID_BODY),
-        _ => None,
+        DofKind::Particle => kind::PARTICLE,
+        DofKind::RigidBody => kind::RIGID_BODY,
+        DofKind::Articulated => kind::ARTICULATED,
+        DofKind::Natural => kind::NATURAL,
+        DofKind::FiniteElements => kind::FINITE_ELEMENTS,
+        DofKind::Lattice => kind::LATTICE,
+        DofKind::Own(_) => kind::OWN,
     }
 }
 
@@ -219,9 +250,11 @@ mod tests {
     #[test]
     fn slices_come_in_order_of_id_and_parts_as_their_first_part_sees_them() {
         let mut dof = Dof::default();
-        dof.push(9, kind::RIGID_BODY, &[12.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]);
-        dof.push(5, kind::PARTICLE, &[1.0, 2.0, f64::NAN]);
-        dof.push(4, kind::RIGID_BODY, &[10.0, 2.0, 3.0, 0.0, 1.0, 0.0, 0.0]);
+        let body = [BlockSize { positions: 7, rates: 6 }];
+        let point = [BlockSize { positions: 3, rates: 3 }];
+        dof.push(9, kind::RIGID_BODY, &body, &[12.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]);
+        dof.push(5, kind::PARTICLE, &point, &[1.0, 2.0, f64::NAN]);
+        dof.push(4, kind::RIGID_BODY, &body, &[10.0, 2.0, 3.0, 0.0, 1.0, 0.0, 0.0]);
         dof.attached.extend([(5, 4), (9, 4)]);
         let mut state = State::new(Precision::default()).unwrap();
         dof.quantise(&mut state);
@@ -230,6 +263,19 @@ mod tests {
         // Half a turn about y.
         assert_eq!(state.groups(&state.bodies()[2])[0].steps, [-2000, 0, 0]);
         assert_eq!(state.groups(&state.bodies()[1])[0].steps, [1000, 2000, 0]);
+    }
+
+    #[test]
+    fn every_kind_is_a_row_of_groups() {
+        let block = |positions, rates| BlockSize { positions, rates };
+        let groups =
+            |kind, blocks: &[BlockSize]| -> Vec<_> { blocks.iter().flat_map(|&b| groups_of(kind, b)).collect() };
+        // A sheep in independent coordinates: a free root and three ball joints; then a hinge and a universal joint.
+        let sheep = groups(kind::ARTICULATED, &[block(7, 6), block(4, 3), block(4, 3), block(4, 3)]);
+        assert_eq!(sheep, [Group::Point, Group::Rotation, Group::Rotation, Group::Rotation, Group::Rotation]);
+        assert_eq!(groups(kind::ARTICULATED, &[block(1, 1), block(2, 2)]), [Group::Scalar; 3]);
+        assert_eq!(groups(kind::NATURAL, &[block(3, 3); 13]), [Group::Point; 13]);
+        assert_eq!(groups(kind::OWN, &[block(3, 3)]), [Group::Scalar; 3]);
     }
 
     #[test]

@@ -193,7 +193,7 @@ impl Publishing {
 
     fn take_arena_event(&mut self, event: ArenaEvent) {
         match event {
-            ArenaEvent::ActorAdded(actor) => self.publish_event(Event::ActorAdded(description::actor(&actor))),
+            ArenaEvent::ActorAdded(actor) => self.publish_event(Event::ActorAdded(description::bounded_actor(&actor))),
             ArenaEvent::ActorRemoved(id) => self.publish_event(Event::ActorRemoved { id }),
             // The wire has no words for effects yet.
             ArenaEvent::Effect(_) => {}

@@ -224,7 +224,7 @@ pub fn description(event_sequence: u32, actors: &[u32]) -> Description {
 }
 
 pub fn actor(id: u32) -> ActorDescription {
-    let part = PartDescription { slice: 10 * id, shape: Shape::Ball { radius: 0.5 } };
+    let part = PartDescription::of_body(10 * id, Shape::Ball { radius: 0.5 });
     ActorDescription { id, kind: "vehicle".into(), name: format!("car {id}"), slot: None, parts: vec![part] }
 }
 

@@ -10,7 +10,7 @@ pub const BODIES_MAX: usize = 16_384;
 /// Most groups of a stream.
 pub const GROUPS_MAX: usize = 65_536;
 /// Most groups of a body.
-pub const BODY_GROUPS_MAX: usize = 255;
+pub const BODY_GROUPS_MAX: usize = 4096;
 
 /// A body of a state, or of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +24,7 @@ pub struct Body {
     /// Where its groups start.
     pub(super) start: u32,
     /// How many groups it has.
-    pub(super) groups: u8,
+    pub(super) groups: u16,
 }
 
 /// Everything at one tick in steps, in order of id: what is coded, once for all streams.
@@ -74,10 +74,10 @@ impl State {
         require(parent.is_none_or(|parent| self.find(parent).is_some()), "parent", "an earlier body")?;
         require(self.bodies.len() < BODIES_MAX, "bodies", "at most 16384")?;
         require(self.groups.len() + layout.len() <= GROUPS_MAX, "groups", "at most 65536")?;
-        require((1..=BODY_GROUPS_MAX).contains(&layout.len()), "groups of a body", "1 to 255")?;
+        require((1..=BODY_GROUPS_MAX).contains(&layout.len()), "groups of a body", "1 to 4096")?;
         let count: usize = layout.iter().map(|group| group.numbers()).sum();
         require(numbers.len() == count, "numbers of a body", "as many as its layout says")?;
-        let (start, groups) = (self.groups.len() as u32, layout.len() as u8);
+        let (start, groups) = (self.groups.len() as u32, layout.len() as u16);
         let mut rest = numbers;
         for &group in layout {
             let (own, others) = rest.split_at(group.numbers());

@@ -31,7 +31,7 @@ mod tests;
 mod walk;
 
 pub use cells::{Cadence, CellEncoder};
-pub use frame::{BODIES_MAX, Body, Frame, GROUPS_MAX, State};
+pub use frame::{BODIES_MAX, BODY_GROUPS_MAX, Body, Frame, GROUPS_MAX, State};
 pub use predict::GroupState;
 pub use priority::{Priorities, Relevance};
 pub use quantise::{Group, Precision, Quantised, absolute, relative, rotate};

@@ -10,6 +10,10 @@ pub struct Slice {
     pub id: u32,
     /// What the numbers mean, one of [`kind`](super::kind).
     pub kind: u8,
+    /// Tick of these numbers: an earlier one than the snapshot's where the snapshot did not carry the body.
+    pub tick: u64,
+    /// What the numbers of Q are, in order; rates are not among them.
+    pub groups: Vec<Group>,
     /// Generalised positions: m, unit quaternions x y z w, rad; in the world.
     pub q: Vec<f32>,
     /// Their rates, per second; an angular velocity in world axes for each quaternion.
@@ -42,7 +46,17 @@ impl Frame {
         }
         // Steps are bounded, so these are far within single precision.
         let single = |numbers: Vec<f64>| numbers.into_iter().map(|x| x as f32).collect();
-        Some(Slice { id: body.id, kind: body.kind, q: single(q), v: single(v) })
+        let groups = self.groups(body).iter().map(|state| state.value.group).filter(|&group| group != Group::Rate);
+        let (id, kind, tick) = (body.id, body.kind, self.tick_of(body, CHAIN_MAX)?);
+        Some(Slice { id, kind, tick, groups: groups.collect(), q: single(q), v: single(v) })
+    }
+
+    /// Tick of the state of a body, or of what it is attached to where that is older.
+    fn tick_of(&self, body: &Body, chain: usize) -> Option<u64> {
+        let at = self.bodies.binary_search_by_key(&body.id, |body| body.id).ok()?;
+        let own = self.ticks[at];
+        let Some(parent) = body.parent else { return Some(own) };
+        Some(own.min(self.tick_of(self.find(parent)?, chain.checked_sub(1)?)?))
     }
 
     /// Q and Q' as coded: in the frame of what the body is attached to.

@@ -147,8 +147,8 @@ impl<C: Coder> Walk<'_, C> {
 
     fn layout(&mut self, kind: u8, groups: &[Group]) -> Result<(u8, Vec<Group>), WireError> {
         let kind = self.coder.raw(kind.into(), 8) as u8;
-        let count = self.coder.raw(groups.len() as u32, 8) as usize;
-        require((1..=BODY_GROUPS_MAX).contains(&count), "groups of a body", "1 to 255")?;
+        let count = self.coder.raw(groups.len() as u32, 16) as usize;
+        require((1..=BODY_GROUPS_MAX).contains(&count), "groups of a body", "1 to 4096")?;
         let code = |i: usize| groups.get(i).map_or(0, |&group| group as u32);
         Ok((kind, (0..count).map(|i| Group::ALL[self.coder.raw(code(i), 2) as usize]).collect()))
     }
@@ -159,16 +159,17 @@ impl<C: Coder> Walk<'_, C> {
         require(!self.coder.is_exhausted(), "coded data", "longer")?;
         let source = self.source.and_then(|s| Some(s.state.groups(s.state.find(added.id)?)));
         let start = next.groups.len();
-        // Points are likely to be near the first point of the body before.
-        let before = next.bodies.last().map(|body| next.groups[body.start as usize].value);
+        // Points are likely to be near the last point of this body, the first one near the first of the body before.
+        let mut before = next.bodies.last().map(|body| next.groups[body.start as usize].value);
         for (i, &group) in added.layout.iter().enumerate() {
             let value = source.map(|groups| groups[i]);
             let near = if group == Group::Point { before } else { None };
             let near = near.filter(|near| near.group == Group::Point).map_or([0; 3], |near| near.steps);
             let value = first_value(self.coder, &mut next.models, group, near, value, &next.precision)?;
             next.groups.push(GroupState::first(value));
+            before = if group == Group::Point { Some(value) } else { before };
         }
-        let groups = added.layout.len() as u8;
+        let groups = added.layout.len() as u16;
         next.bodies.push(Body { id: added.id, kind: added.kind, parent: added.parent, start: start as u32, groups });
         next.ticks.push(next.tick);
         Ok(())

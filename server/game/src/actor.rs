@@ -3,9 +3,10 @@
 //! An actor owns the bodies that it added to the world: they come and go with it, and it alone places them anew. What it
 //! does to the world, itself and others, it does through forces, actuators and potentials, in stage 3.
 
-use pita_sim::{BodyId, DVec3, Phase, Shape, SimError, StaticId, World};
+use pita_sim::{BodyId, DVec3, Phase, SimError, StaticId, World};
 
 use crate::free_form::Appearance;
+use crate::part::PartInfo;
 use crate::rehearsal::Memory;
 use crate::step::{Message, Step};
 use crate::{Controls, Pose};
@@ -23,15 +24,6 @@ pub struct ActorInfo {
     pub slot: Option<u16>,
     /// Its parts; the first is the one that says where the actor is.
     pub parts: Vec<PartInfo>,
-}
-
-/// A slice of the global state with the shape that it carries.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PartInfo {
-    /// Serial number of the slice, [`World::serial`].
-    pub slice: u32,
-    /// Shape in the slice's frame.
-    pub shape: Shape,
 }
 
 /// A collision of an actor, as stage 2 found it.

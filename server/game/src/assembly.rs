@@ -6,7 +6,7 @@
 use pita_sim::{BodyId, Collider, DQuat, DVec3, Material, RigidBodyDesc, Shape, SimError, World};
 
 use crate::Pose;
-use crate::actor::PartInfo;
+use crate::part::PartInfo;
 
 /// One rigid body of an assembly, in the assembly's frame.
 #[derive(Clone, Debug)]
@@ -57,7 +57,7 @@ impl Assembly {
             ..RigidBodyDesc::new(self.pose.position + turn * position, mass, shape.inertia(mass))
         })?;
         self.bodies.push(body);
-        self.parts.push(PartInfo { slice: world.serial(body).unwrap_or_default(), shape });
+        self.parts.push(PartInfo::new(world, body, shape));
         self.rest.push((position, rotation));
         Ok(body)
     }

@@ -9,8 +9,9 @@ use std::collections::BTreeMap;
 use pita_sim::{Material, SimError, World};
 use serde::de::DeserializeOwned;
 
-use crate::actor::{Actor, ActorInfo, PartInfo};
+use crate::actor::{Actor, ActorInfo};
 use crate::arena_file::{ActorFile, ArenaError, ArenaFile, Key, Materials};
+use crate::part::PartInfo;
 use crate::prop::Prop;
 use crate::spawn::Pose;
 use crate::tornado::Tornado;

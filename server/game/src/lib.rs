@@ -1,7 +1,7 @@
 //! PITA's game: arenas and actors on the engine, and the pipeline that runs them.
 //!
 //! Owns: the five stages of a tick ([`pipeline`]), arenas and their files ([`arena`], [`arena_file`]), what acts in them
-//! ([`actor`], [`step`], [`kinds`], [`vehicle`], [`prop`], [`tornado`], [`driver`]), and the controls that players send ([`controls`]). It may touch the
+//! ([`actor`], [`step`], [`kinds`], [`part`], [`vehicle`], [`prop`], [`tornado`], [`driver`]), and the controls that players send ([`controls`]). It may touch the
 //! engine, `pita-sim`, and nothing else: no clock, no disk, no network, no randomness. What a tick needs from outside
 //! comes in through [`Ports`].
 //!
@@ -17,6 +17,7 @@ pub mod controls;
 pub mod driver;
 pub mod free_form;
 pub mod kinds;
+pub mod part;
 pub mod particles;
 pub mod pipeline;
 pub mod prop;
@@ -28,11 +29,12 @@ pub mod step;
 pub mod tornado;
 pub mod vehicle;
 
-pub use actor::{Actor, ActorInfo, Contact, ContactSide, PartInfo, Partner, Response, WhenLost};
+pub use actor::{Actor, ActorInfo, Contact, ContactSide, Partner, Response, WhenLost};
 pub use arena::{Arena, ArenaEvent, ArenaSettings, Command, StaticInfo};
 pub use arena_file::ArenaError;
 pub use controls::Controls;
 pub use kinds::{ActorKind, ActorKinds, Site};
+pub use part::{PartInfo, PartMount};
 pub use pipeline::{Ports, Stage};
 pub use rehearsal::{BodyState, CarState, Memory, Rehearsal};
 pub use spawn::Pose;

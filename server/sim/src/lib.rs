@@ -43,7 +43,10 @@ pub use dof::articulated::{
 pub use dof::finite_elements::FiniteElements;
 pub use dof::lattice::{Lattice, LatticeDesc, RestShape};
 pub use dof::natural::{Natural, NaturalDesc, NaturalPart};
-pub use dof::{BodyId, Dof, DofKind, FigureDesc, Frame, PartCollider, PartPoint, ParticleDesc, RigidBodyDesc};
+pub use dof::{
+    BlockSize, BodyId, Dof, DofKind, FigureDesc, Frame, Mount, MountJoint, MountNode, PartCollider, PartPoint,
+    ParticleDesc, RigidBodyDesc,
+};
 pub use error::SimError;
 pub use glam::{DMat3, DQuat, DVec3};
 pub use integrate::{Method, Preconditioner, StepReport, StoppedBecause};

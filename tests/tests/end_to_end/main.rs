@@ -9,6 +9,7 @@ mod daemon;
 mod driving;
 mod flooded;
 mod frozen;
+mod kinds;
 mod leaving;
 mod programs;
 mod refusals;

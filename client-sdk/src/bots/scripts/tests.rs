@@ -40,7 +40,7 @@ impl Car {
 }
 
 fn roster(count: u32) -> Roster {
-    let part = |slice| PartDescription { slice, shape: Shape::Ball { radius: 1.0 } };
+    let part = |slice| PartDescription::of_body(slice, Shape::Ball { radius: 1.0 });
     let car = |id| ActorDescription {
         id,
         kind: "vehicle".into(),

@@ -17,10 +17,11 @@ use glam::{DQuat, DVec3};
 use pita_sim::{BodyId, Phase, Shape, SimError, World};
 
 use crate::Pose;
-use crate::actor::{Actor, ActorInfo, Contact, PartInfo, Partner, Response, WhenLost};
+use crate::actor::{Actor, ActorInfo, Contact, Partner, Response, WhenLost};
 use crate::arena_file::{ArenaError, ArenaFile, Key};
 use crate::free_form::Appearance;
 use crate::kinds::{ActorKind, Site};
+use crate::part::PartInfo;
 use crate::particles::Particles;
 use crate::step::Step;
 use column::Column;
@@ -81,10 +82,7 @@ impl ActorKind for Tornado {
         let bodies: Vec<_> = column.bodies().iter().copied().chain(dust.bodies()).collect();
         let grain = Shape::Ball { radius: DUST_RADIUS };
         let shapes = column.shapes().iter().chain(std::iter::repeat(&grain));
-        let part = |(&body, shape): (&BodyId, &Shape)| PartInfo {
-            slice: site.world.serial(body).unwrap_or_default(),
-            shape: shape.clone(),
-        };
+        let part = |(&body, shape): (&BodyId, &Shape)| PartInfo::new(site.world, body, shape.clone());
         let parts = bodies.iter().zip(shapes).map(part).collect();
         Ok(Self {
             info: site.info(Self::KIND, parts),

@@ -8,8 +8,8 @@ use pita_sim::{
 
 use super::VehicleParameters;
 use crate::Pose;
-use crate::actor::PartInfo;
 use crate::arena_file::material;
+use crate::part::PartInfo;
 
 /// Place of a wheel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -173,10 +173,7 @@ impl Rig {
 
     /// Slices and shapes of the bodies.
     pub fn parts(&self, world: &World) -> Vec<PartInfo> {
-        let part = |(&body, shape): (&BodyId, &Shape)| PartInfo {
-            slice: world.serial(body).unwrap_or_default(),
-            shape: shape.clone(),
-        };
+        let part = |(&body, shape): (&BodyId, &Shape)| PartInfo::new(world, body, shape.clone());
         self.bodies.iter().zip(&self.shapes).map(part).collect()
     }
 

@@ -52,7 +52,7 @@ fn add_probe(
         let desc = RigidBodyDesc { velocity, collider, ..RigidBodyDesc::new(position, 50.0, shape.inertia(50.0)) };
         let body = world.add_rigid_body(desc)?;
         *added_body = Some(body);
-        let parts = vec![PartInfo { slice: world.serial(body).unwrap_or_default(), shape }];
+        let parts = vec![PartInfo::new(world, body, shape)];
         let info = ActorInfo { id, kind: "probe", name: "probe".to_owned(), slot: None, parts };
         Ok(Box::new(Probe { info, bodies: [body], passes, told: remembered }))
     };

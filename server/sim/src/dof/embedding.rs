@@ -5,7 +5,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{Columns, Frame};
+use super::{Columns, Frame, MountNode};
 use crate::potential::cross_matrix;
 use crate::potential::elasticity::Principal;
 
@@ -41,6 +41,12 @@ impl<const N: usize> EmbeddedPoint<N> {
             }
             columns
         })
+    }
+
+    /// For those who show the point: its nodes, given by their numbers.
+    pub fn mount_nodes(&self, numbers: &[u32]) -> Vec<MountNode> {
+        let shares = self.weights.into_iter().zip(self.gradients).zip(numbers);
+        shares.map(|((weight, gradient), &point)| MountNode { point, weight, gradient }).collect()
     }
 
     fn mean(&self, of: &[DVec3; N]) -> DVec3 {

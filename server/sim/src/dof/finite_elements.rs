@@ -17,7 +17,7 @@ use glam::{DMat3, DQuat, DVec3};
 use super::embedding::EmbeddedPoint;
 use super::interface::{BlockSize, Columns, Dof, Inertia, LocalState, PartPoint};
 use super::nodal::{Nodes, SharedMass, Slot, require_damping, viscosity};
-use super::{DofKind, Frame};
+use super::{DofKind, Frame, Mount};
 use crate::error::SimError;
 use crate::mass::{Density, tetrahedron_mass};
 use crate::mesh::TetrahedralMesh;
@@ -139,6 +139,11 @@ impl Dof for FiniteElements {
     fn jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns)) {
         let (nodes, point) = self.embedded(at);
         self.nodes.jacobian(nodes, &point, q, visit);
+    }
+
+    fn mount(&self, at: PartPoint) -> Option<Mount> {
+        let (nodes, point) = self.embedded(at);
+        Some(self.nodes.mount(nodes, &point))
     }
 
     fn inertia(&self) -> Inertia<'_> {

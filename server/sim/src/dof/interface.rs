@@ -7,7 +7,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::Frame;
+use super::{Frame, Mount};
 use crate::error::SimError;
 
 /// Most rates of a block.
@@ -151,6 +151,12 @@ pub trait Dof: Send + Sync {
     ) -> Frame<f64> {
         self.jacobian(at, q, visit);
         self.frame(at, q, v)
+    }
+
+    /// How the frame at a material point follows from Q, for whoever shows the body and does not know its kind. `None`
+    /// where that cannot be said: the body is shown by what its game makes of Q.
+    fn mount(&self, _at: PartPoint) -> Option<Mount> {
+        None
     }
 
     // --- Inertia

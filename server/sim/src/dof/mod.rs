@@ -10,6 +10,7 @@ pub mod finite_elements;
 mod frame;
 mod interface;
 pub mod lattice;
+mod mount;
 pub mod natural;
 mod nodal;
 pub(crate) mod particle;
@@ -24,6 +25,7 @@ pub use interface::{
     BLOCK_RATES_MAX, BlockSize, Columns, Dof, Inertia, LocalState, PartInertia, PartLoad, PartPoint, PointMasses,
     PointRod, RateBlock,
 };
+pub use mount::{Mount, MountJoint, MountNode};
 
 use crate::collide::Collider;
 use crate::error::{LARGEST, SimError, require, require_rotation, require_vector};

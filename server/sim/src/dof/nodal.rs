@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::Frame;
 use super::embedding::EmbeddedPoint;
 use super::interface::{BlockSize, Columns, PointMasses};
+use super::{Frame, Mount, MountNode};
 use crate::error::{SimError, require};
 use crate::potential::elasticity::Elastic;
 
@@ -59,6 +59,19 @@ impl Nodes {
     pub fn frame<const N: usize>(&self, nodes: [u32; N], point: &EmbeddedPoint<N>, [q, v]: [&[f64]; 2]) -> Frame<f64> {
         let velocities = nodes.map(|node| if self.moves(node) { numbers_of(node, v) } else { DVec3::ZERO });
         point.frame(&self.places(nodes, q), &velocities)
+    }
+
+    /// How the frame at a point of an element follows from the nodes that move.
+    pub fn mount<const N: usize>(&self, nodes: [u32; N], point: &EmbeddedPoint<N>) -> Mount {
+        let (moving, fixed): (Vec<_>, Vec<_>) =
+            point.mount_nodes(&nodes).into_iter().partition(|node| self.moves(node.point));
+        let (mut position, mut deformation) = (DVec3::ZERO, DMat3::ZERO);
+        for MountNode { point, weight, gradient } in fixed {
+            let rest = self.rest[point as usize];
+            position += weight * rest;
+            deformation += DMat3::from_cols(rest * gradient.x, rest * gradient.y, rest * gradient.z);
+        }
+        Mount::Points { nodes: moving, position, deformation }
     }
 
     /// Hands `visit` the nodes of an element that move, with the derivatives of the frame at a point of it.

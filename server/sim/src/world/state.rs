@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 
 use super::World;
-use crate::dof::{BodyId, DofKind, Frame, PartPoint, Pose, Twist};
+use crate::dof::{BlockSize, BodyId, DofKind, Frame, Mount, PartPoint, Pose, Twist};
 use crate::error::{LARGEST, SimError, require, require_rotation, require_vector};
 
 /// A body's share of Q and Q'.
@@ -13,11 +13,17 @@ pub struct SliceView<'a> {
     pub serial: u32,
     /// What the numbers mean.
     pub kind: DofKind,
+    /// What its numbers are, block by block: a block of (3, 3) is a point, of (4, 3) a unit quaternion, of (7, 6) both,
+    /// of (n, n) as many coordinates of joints.
+    pub blocks: &'a [BlockSize],
     /// Positions: m, and a unit quaternion x y z w for a rigid body.
     pub q: &'a [f64],
     /// Rates: m/s, and rad/s in world axes for a rigid body.
     pub v: &'a [f64],
 }
+
+const PARTICLE_BLOCKS: &[BlockSize] = &[BlockSize { positions: 3, rates: 3 }];
+const RIGID_BODY_BLOCKS: &[BlockSize] = &[BlockSize { positions: 7, rates: 6 }];
 
 impl World {
     /// Centre of mass, m.
@@ -168,11 +174,27 @@ impl World {
         (at.part < parts).then(|| body.frame(at, &self.state))
     }
 
+    /// How the frame at a material point follows from the body's Q. `None` where there is no such body or part, or its
+    /// kind does not say.
+    pub fn mount(&self, id: BodyId, at: PartPoint) -> Option<Mount> {
+        let body = self.bodies.get(id)?;
+        match &body.figure {
+            Some(figure) if at.part < figure.dof.parts() => figure.dof.mount(at),
+            Some(_) => None,
+            None => (at.part == 0).then_some(Mount::Body { offset: at.point }),
+        }
+    }
+
     /// A body's positions and rates.
     pub fn slice(&self, id: BodyId) -> Option<SliceView<'_>> {
         let body = self.bodies.get(id)?;
         let (q, v) = (self.state.q(body.slice), self.state.v(body.slice));
-        Some(SliceView { serial: body.serial, kind: body.kind, q, v })
+        let blocks = match (&body.figure, body.kind) {
+            (Some(figure), _) => figure.dof.blocks(),
+            (None, DofKind::Particle) => PARTICLE_BLOCKS,
+            (None, _) => RIGID_BODY_BLOCKS,
+        };
+        Some(SliceView { serial: body.serial, kind: body.kind, blocks, q, v })
     }
 
     /// Sets positions and rates of a body of a general kind; its contacts of the last tick are forgotten, and so is a

@@ -6,7 +6,7 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::limit::JointLimit;
 use super::motor::{JointMotor, JointSpring};
-use crate::dof::{BlockSize, Columns, Twist};
+use crate::dof::{BlockSize, Columns, MountJoint, Twist};
 
 /// How a part may move against its parent, or against the world. Axes are those at rest, in the parent's axes; they need
 /// not be of length 1.
@@ -161,6 +161,17 @@ impl Joint {
     pub fn rates(&self) -> Range<usize> {
         let size = self.kind.size().map_or(0, |size| size.rates);
         self.starts.1..self.starts.1 + usize::from(size)
+    }
+
+    /// For those who show the part.
+    pub fn mount(&self) -> MountJoint {
+        MountJoint {
+            kind: self.kind,
+            start: self.starts.0 as u32,
+            in_parent: self.in_parent,
+            in_part: self.in_part,
+            rest: DQuat::from_mat3(&self.rest),
+        }
     }
 
     /// Whether it has potentials of its own.

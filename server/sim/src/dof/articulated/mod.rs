@@ -43,7 +43,7 @@ pub use motor::{JointDrive, JointMotor, JointSpring};
 pub use potentials::MotorControls;
 
 use super::interface::{BlockSize, Columns, Dof, Inertia, LocalState, PartInertia, PartLoad, PartPoint, RateBlock};
-use super::{DofKind, Frame, Twist};
+use super::{DofKind, Frame, Mount, Twist};
 use crate::error::{SimError, require, require_rotation};
 use crate::potential::geometric_stiffness;
 use joint::{Joint, Place};
@@ -242,6 +242,10 @@ impl Dof for Articulated {
             visit(block, columns);
         });
         Frame::new(place.point(at.point), place.rotation, twist.linear, twist.angular)
+    }
+
+    fn mount(&self, at: PartPoint) -> Option<Mount> {
+        Some(Mount::Chain { joints: self.path(at.part).map(Joint::mount).collect(), offset: at.point })
     }
 
     fn inertia(&self) -> Inertia<'_> {

@@ -25,7 +25,7 @@ pub use rest_shape::RestShape;
 use super::embedding::EmbeddedPoint;
 use super::interface::{BlockSize, Columns, Dof, Inertia, LocalState, PartPoint, PointMasses};
 use super::nodal::{Nodes, SharedMass, Slot, require_damping, viscosity};
-use super::{DofKind, Frame};
+use super::{DofKind, Frame, Mount};
 use crate::error::{SimError, require, require_vector};
 use crate::mass::{Density, Polyhedron, lattice_cell_mass, trilinear};
 use crate::potential::elasticity::{Curvature, Elastic, Tangent};
@@ -264,6 +264,11 @@ impl Dof for Lattice {
     fn jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns)) {
         let (nodes, point) = self.embedded(at);
         self.nodes.jacobian(nodes, &point, q, visit);
+    }
+
+    fn mount(&self, at: PartPoint) -> Option<Mount> {
+        let (nodes, point) = self.embedded(at);
+        Some(self.nodes.mount(nodes, &point))
     }
 
     fn inertia(&self) -> Inertia<'_> {

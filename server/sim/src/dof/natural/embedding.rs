@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::desc::EMBEDDED_IN;
 use crate::dof::embedding::EmbeddedPoint;
-use crate::dof::{Columns, Frame};
+use crate::dof::{Columns, Frame, Mount, MountNode};
 use crate::error::SimError;
 use crate::mass::{MassProperties, embedded_mass};
 
@@ -96,6 +96,24 @@ impl Embedding {
             }
             Self::Tetrahedron { first, weights } => {
                 between_four(first, weights, local).frame(&[0, 1, 2, 3].map(q), &[0, 1, 2, 3].map(v))
+            }
+        }
+    }
+
+    /// How the frame at `local` follows from `points`, given by their numbers.
+    pub fn mount(&self, local: DVec3, points: &[u32]) -> Mount {
+        match *self {
+            Self::Point { offset } => {
+                let nodes = vec![MountNode { point: points[0], weight: 1.0, gradient: DVec3::ZERO }];
+                Mount::Points { nodes, position: local - offset, deformation: DMat3::IDENTITY }
+            }
+            Self::Line { start, direction, length } => {
+                let (share, offset) = split(local - start, direction, length);
+                Mount::Line { points: [points[0], points[1]], share, direction, offset }
+            }
+            Self::Tetrahedron { first, weights } => {
+                let nodes = between_four(first, weights, local).mount_nodes(points);
+                Mount::Points { nodes, position: DVec3::ZERO, deformation: DMat3::ZERO }
             }
         }
     }

@@ -26,7 +26,7 @@ use glam::{DQuat, DVec3};
 pub use desc::{NaturalDesc, NaturalPart, POINTS_MAX, RODS_MAX};
 
 use super::interface::{BlockSize, Columns, Dof, Inertia, PartPoint, PointMasses, PointRod};
-use super::{DofKind, Frame};
+use super::{DofKind, Frame, Mount};
 use crate::error::{SimError, require};
 use embedding::Embedding;
 
@@ -107,6 +107,11 @@ impl Dof for Natural {
         let points = &self.desc.parts[at.part as usize].points;
         let embedding = &self.embeddings[at.part as usize];
         embedding.jacobian(at.point, self.of_points(at.part, q), |i, columns| visit(points[i] as usize, columns));
+    }
+
+    fn mount(&self, at: PartPoint) -> Option<Mount> {
+        let points = &self.desc.parts[at.part as usize].points;
+        Some(self.embeddings[at.part as usize].mount(at.point, points))
     }
 
     fn inertia(&self) -> Inertia<'_> {
