@@ -145,8 +145,8 @@ fn jelly_parts(jelly: &FiniteElements) -> u32 {
     jelly.parts()
 }
 
-/// Thirty ticks of a stream. Positions agree within what steps of a millimetre allow, rotations within 0.3 degrees (of
-/// elements, whose edges of half a metre end on steps, 0.6).
+/// Thirty ticks of a stream. Steps of a millimetre, and of 1/1500 at each of five joints one after the other, allow for so
+/// much.
 #[test]
 fn clients_show_parts_of_every_kind_where_the_engine_has_them() {
     let mut zoo = Zoo::new();
@@ -181,7 +181,7 @@ fn clients_show_parts_of_every_kind_where_the_engine_has_them() {
             let off = pose.position.distance(DVec3::from(frame.position));
             let engine: DMat3 = frame.rotation.value();
             let turned = pose.rotation.angle_between(DQuat::from_mat3(&engine).normalize()).to_degrees();
-            assert!(off < 4e-3 && turned < 0.6, "{:?} in tick {tick}: {off} m, {turned} degrees", part.mount);
+            assert!(off < 8e-3 && turned < 0.6, "{:?} in tick {tick}: {off} m, {turned} degrees", part.mount);
         }
     }
 }
