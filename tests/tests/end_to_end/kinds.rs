@@ -177,7 +177,7 @@ fn clients_show_parts_of_every_kind_where_the_engine_has_them() {
                 continue;
             }
             let pose = part_pose(part, slice).unwrap();
-            let frame = frames.last().unwrap();
+            let frame = frames.into_iter().next_back().unwrap();
             let off = pose.position.distance(DVec3::from(frame.position));
             let engine: DMat3 = frame.rotation.value();
             let turned = pose.rotation.angle_between(DQuat::from_mat3(&engine).normalize()).to_degrees();
