@@ -13,6 +13,7 @@ use crate::actor::{Actor, ActorInfo};
 use crate::arena_file::{ActorFile, ArenaError, ArenaFile, Key, Materials};
 use crate::part::PartInfo;
 use crate::prop::Prop;
+use crate::sheep::Sheep;
 use crate::spawn::Pose;
 use crate::tornado::Tornado;
 
@@ -82,7 +83,7 @@ impl ActorKinds {
 
     /// The kinds that come with the game.
     pub fn built_in() -> Self {
-        Self::none().with::<Prop>().with::<Tornado>()
+        Self::none().with::<Prop>().with::<Sheep>().with::<Tornado>()
     }
 
     /// These kinds and `K`, which takes the place of one that has its name.

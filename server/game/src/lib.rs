@@ -1,7 +1,7 @@
 //! PITA's game: arenas and actors on the engine, and the pipeline that runs them.
 //!
 //! Owns: the five stages of a tick ([`pipeline`]), arenas and their files ([`arena`], [`arena_file`]), what acts in them
-//! ([`actor`], [`step`], [`kinds`], [`part`], [`vehicle`], [`prop`], [`tornado`], [`driver`]), and the controls that players send ([`controls`]). It may touch the
+//! ([`actor`], [`step`], [`kinds`], [`part`], [`vehicle`], [`prop`], [`sheep`], [`tornado`], [`driver`]), and the controls that players send ([`controls`]). It may touch the
 //! engine, `pita-sim`, and nothing else: no clock, no disk, no network, no randomness. What a tick needs from outside
 //! comes in through [`Ports`].
 //!
@@ -24,6 +24,7 @@ pub mod prop;
 pub mod rehearsal;
 pub mod scene;
 pub mod scheduler;
+pub mod sheep;
 pub mod spawn;
 pub mod step;
 pub mod tornado;

@@ -10,6 +10,7 @@ mod pipeline;
 mod players;
 mod rehearsals;
 mod reproducibility;
+mod sheep;
 mod stunts;
 mod test_track;
 mod tornado;
