@@ -12,7 +12,7 @@ use serde::Deserialize;
 
 use super::anatomy::{BODY, PARTS, POINTS, Part, STANDING, points_of};
 use crate::Pose;
-use crate::actor::PartInfo;
+use crate::part::PartInfo;
 
 /// What the DOF of a sheep are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -92,13 +92,13 @@ impl Rig {
         frame.ok_or(SimError::Gone { what: "a part of the sheep" })
     }
 
-    /// What is seen of it: its bodies.
+    /// What is seen of it: a box for each part.
     pub fn parts(&self, world: &World) -> Vec<PartInfo> {
-        let part = |(&body, part): (&BodyId, &Part)| PartInfo {
-            slice: world.serial(body).unwrap_or_default(),
-            shape: part.shape(),
+        let part = |(part, desc): (u32, &Part)| match self.figure {
+            Some(_) => PartInfo::at(world, self.bodies[0], PartPoint { part, point: DVec3::ZERO }, desc.shape()),
+            None => PartInfo::new(world, self.bodies[part as usize], desc.shape()),
         };
-        self.bodies.iter().zip(&PARTS).map(part).collect()
+        (0..).zip(&PARTS).map(part).collect()
     }
 
     /// Stands it on the ground at `pose`, at rest.

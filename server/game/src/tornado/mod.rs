@@ -171,8 +171,9 @@ impl Actor for Tornado {
         if is_ground && contact.own.body == Some(self.column.foot()) {
             self.touches_ground = contact.phase != Phase::End;
         }
-        if self.is_valid_victim(contact) && self.seen.len() < self.seen.capacity() {
-            self.seen.extend(contact.other.body);
+        if let Some(body) = contact.other.body.filter(|_| self.is_valid_victim(contact)) {
+            let is_news = !self.seen.contains(&body) && self.seen.len() < self.seen.capacity();
+            self.seen.extend(is_news.then_some(body));
         }
         Response::Pass
     }
