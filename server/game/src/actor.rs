@@ -5,7 +5,6 @@
 
 use pita_sim::{BodyId, DVec3, Phase, SimError, StaticId, World};
 
-use crate::free_form::Appearance;
 use crate::part::PartInfo;
 use crate::rehearsal::Memory;
 use crate::step::{Message, Step};
@@ -132,11 +131,6 @@ pub trait Actor: Send {
     /// Stage 3, after every [`Actor::step`]: what actor `from` told this one in this tick. Acting on it has to wait for
     /// the next step.
     fn hear(&mut self, _from: u32, _message: &Message) {}
-
-    /// How what is drawn of it is turned and deformed since its last step.
-    fn appearance(&self) -> Appearance {
-        Appearance::PLAIN
-    }
 
     /// What becomes of it when it is lost.
     fn when_lost(&self) -> WhenLost {

@@ -17,7 +17,6 @@ use pita_sim::{BodyId, Collision, Shape, World};
 use crate::Controls;
 use crate::actor::{Actor, ActorInfo};
 use crate::arena_file::{BoundsFile, Materials};
-use crate::free_form::Appearance;
 use crate::pipeline::Ports;
 use crate::spawn::Pose;
 use crate::step::{Effect, LogicReport, Other, Request};
@@ -176,11 +175,6 @@ impl Arena {
     /// An actor by its id.
     pub fn actor(&self, id: u32) -> Option<&dyn Actor> {
         self.actors.get(&id).map(|actor| &**actor)
-    }
-
-    /// How what is drawn of an actor is turned and deformed; `None` where there is no such actor.
-    pub fn appearance(&self, id: u32) -> Option<Appearance> {
-        self.actors.get(&id).map(|actor| actor.appearance())
     }
 
     /// The surfaces of the arena.

@@ -2,17 +2,20 @@
 //! Local Deformations of Solid Primitives", 1984).
 //!
 //! Owns maps from points to points: [`FreeForm`] is one about an axis, a slice of them is one after the other, [`Warp`] is
-//! one as a few numbers that can be animated, sent and drawn, [`KeyFrames`] gives such numbers over time. Any mesh or hull
+//! one as a few numbers that can be animated, sent and drawn, [`KeyFrames`] gives such numbers over time, [`AppearanceDof`]
+//! makes DOF of them. Any mesh or hull
 //! is deformed by its points; nothing is inverted. The formula is the engine's [`RestShape`]: where a body is to follow
 //! with dynamics of its own, the same numbers steer a [`Lattice`](pita_sim::Lattice), whose nodes are DOF.
 //! Knows nothing of actors and arenas.
 
+mod dof;
 mod key_frames;
 mod warp;
 
 use glam::{DQuat, DVec3};
 use pita_sim::{RestShape, Shape};
 
+pub use dof::AppearanceDof;
 pub use key_frames::{KEYS_MAX, KeyFrames};
 pub use warp::{Appearance, Warp};
 

@@ -83,6 +83,23 @@ impl Appearance {
     /// As its mesh is.
     pub const PLAIN: Self = Self { spin: 0.0, warp: Warp::NONE, strength: 1.0 };
 
+    /// How many numbers it is.
+    pub const NUMBERS: usize = 9;
+
+    /// Cosine and sine of the spin, strength; scale x, y, z; twist; bend towards x, z. Numbers between two of such lists
+    /// are between them too, all the way round.
+    pub fn numbers(&self) -> [f64; Self::NUMBERS] {
+        let (sin, cos) = self.spin.sin_cos();
+        let [x, y, z, twist, bend_x, bend_z] = self.warp.numbers();
+        [cos, sin, self.strength, x, y, z, twist, bend_x, bend_z]
+    }
+
+    /// As [`Appearance::numbers`] has them.
+    pub fn of_numbers([cos, sin, strength, warp @ ..]: [f64; Self::NUMBERS]) -> Self {
+        let spin = f64::atan2(sin, cos).rem_euclid(std::f64::consts::TAU);
+        Self { spin, warp: Warp::of_numbers(warp), strength }
+    }
+
     /// Turns and deforms points of the mesh in place, and puts its origin to `base`, m.
     pub fn deform(&self, base: DVec3, points: &mut [DVec3]) {
         let spin = DQuat::from_rotation_y(self.spin);

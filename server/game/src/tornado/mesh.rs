@@ -1,13 +1,14 @@
 //! What a tornado looks like: a funnel, and the numbers that warp it.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use glam::{DQuat, DVec2, DVec3};
-use pita_sim::SimError;
+use pita_sim::{BodyId, FigureDesc, SimError, World};
 
 use super::TornadoParameters;
 use super::column::Column;
-use crate::free_form::{Appearance, KeyFrames, Warp};
+use crate::free_form::{Appearance, AppearanceDof, KeyFrames, Warp};
 
 /// Rings of the funnel's mesh, from foot to top.
 pub const RINGS: usize = 12;
@@ -31,34 +32,46 @@ pub fn mesh(p: &TornadoParameters) -> Vec<DVec3> {
     (0..RINGS).flat_map(|ring| (0..SECTORS).map(move |sector| point(ring, sector))).collect()
 }
 
-/// What spins and warps the funnel.
+/// What spins and warps the funnel: it says what the funnel's DOF shall be, and the integrator moves them there.
 pub struct Warping {
     keys: Option<KeyFrames<{ Warp::NUMBERS }>>,
+    body: BodyId,
     /// Since it appeared first, s.
     time: f64,
-    shown: Appearance,
 }
 
 impl Warping {
-    /// A funnel that is not there yet.
+    /// Adds the DOF of a funnel that is not there yet; `place`, m, is where they are said to be.
     ///
     /// # Errors
-    /// What is wrong with its key-frames.
-    pub fn new(p: &TornadoParameters) -> Result<Self, SimError> {
+    /// What is wrong with its key-frames, and what the engine says.
+    pub fn add(world: &mut World, p: &TornadoParameters, place: DVec3) -> Result<Self, SimError> {
         let keys: Vec<_> = p.warp.iter().map(|frame| frame.key()).collect();
         let keys = if keys.is_empty() { None } else { Some(KeyFrames::new(keys, Some(p.warp_period))?) };
-        Ok(Self { keys, time: 0.0, shown: Appearance { strength: 0.0, ..Appearance::PLAIN } })
+        let q = Appearance { strength: 0.0, ..Appearance::PLAIN }.numbers().to_vec();
+        let (v, dof) = (vec![0.0; q.len()], AppearanceDof::new(place, world.settings().gravity));
+        let body = world.add_figure(FigureDesc { dof: Arc::new(dof), q, v, colliders: Vec::new() })?;
+        Ok(Self { keys, body, time: 0.0 })
     }
 
-    /// As of this tick.
-    pub fn shown(&self) -> Appearance {
-        self.shown
+    /// The body whose DOF they are.
+    pub fn body(&self) -> BodyId {
+        self.body
     }
 
-    /// Lets `dt` pass. What is key-framed comes on top of what the column's motion does by itself: its spacing stretches
+    /// Lets a tick pass. What is key-framed comes on top of what the column's motion does by itself: its spacing stretches
     /// the funnel, its lean bends it, its strength scales it.
-    pub fn step(&mut self, p: &TornadoParameters, spheres: [(DVec3, DVec3); Column::SPHERES], strength: f64, dt: f64) {
-        self.time += dt;
+    ///
+    /// # Errors
+    /// What the engine says.
+    pub fn step(
+        &mut self,
+        world: &mut World,
+        p: &TornadoParameters,
+        spheres: [(DVec3, DVec3); Column::SPHERES],
+        strength: f64,
+    ) -> Result<(), SimError> {
+        self.time += world.settings().dt;
         let [(foot, _), .., (top, _)] = spheres;
         let height = (top.y - foot.y).max(LEAST * p.height);
         // The tip of an arc of length h and curvature c is c h² / 2 off its start.
@@ -70,10 +83,7 @@ impl Warping {
             bend: lean.clamp_length_max(BENT_MAX / height),
         };
         let keyed = self.keys.as_ref().map_or(Warp::NONE, |keys| Warp::of_numbers(keys.at(self.time)));
-        self.shown = Appearance {
-            spin: (self.shown.spin + p.spin_speed * dt).rem_euclid(TAU),
-            warp: moved.with(&keyed),
-            strength,
-        };
+        let wanted = Appearance { spin: p.spin_speed * self.time, warp: moved.with(&keyed), strength };
+        world.set_controls(self.body, &wanted.numbers())
     }
 }

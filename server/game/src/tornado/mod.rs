@@ -19,7 +19,6 @@ use pita_sim::{BodyId, Phase, Shape, SimError, World};
 use crate::Pose;
 use crate::actor::{Actor, ActorInfo, Contact, Partner, Response, WhenLost};
 use crate::arena_file::{ArenaError, ArenaFile, Key};
-use crate::free_form::Appearance;
 use crate::kinds::{ActorKind, Site};
 use crate::part::PartInfo;
 use crate::particles::Particles;
@@ -77,17 +76,19 @@ impl ActorKind for Tornado {
         let (start, p) = (site.pose.position, parameters);
         let column = Column::add(site.world, p, start)?;
         let path = Path::add(site.world, column.foot(), &p.legs, p.path_acceleration)?;
+        let warping = Warping::add(site.world, p, start)?;
         // Out of sight, below the ground.
         let dust = Particles::add(site.world, p.dust, DUST_GRIP, start - DVec3::Y)?;
-        let bodies: Vec<_> = column.bodies().iter().copied().chain(dust.bodies()).collect();
         let grain = Shape::Ball { radius: DUST_RADIUS };
-        let shapes = column.shapes().iter().chain(std::iter::repeat(&grain));
-        let part = |(&body, shape): (&BodyId, &Shape)| PartInfo::new(site.world, body, shape.clone());
-        let parts = bodies.iter().zip(shapes).map(part).collect();
+        // The funnel is of a kind of the game's own: its shape is the mesh before it is warped.
+        let funnel = Shape::Hull { points: mesh::mesh(p), radius: 0.0 };
+        let spheres = column.bodies().iter().copied().zip(column.shapes().iter().cloned());
+        let all = spheres.chain([(warping.body(), funnel)]).chain(dust.bodies().map(|body| (body, grain.clone())));
+        let (bodies, parts) = all.map(|(body, shape)| (body, PartInfo::new(site.world, body, shape))).unzip();
         Ok(Self {
             info: site.info(Self::KIND, parts),
             life: Life::new(p.lifespan()),
-            warping: Warping::new(p)?,
+            warping,
             victims: Victims::default(),
             dust_angle: 0.0,
             touches_ground: false,
@@ -116,10 +117,9 @@ impl Tornado {
     }
 
     /// Spins and warps its mesh.
-    fn update_warp(&mut self, step: &Step) -> Result<(), SimError> {
+    fn update_warp(&mut self, step: &mut Step) -> Result<(), SimError> {
         let spheres = self.column.spheres(step.world)?;
-        self.warping.step(&self.parameters, spheres, self.life.strength(), step.dt);
-        Ok(())
+        self.warping.step(step.world, &self.parameters, spheres, self.life.strength())
     }
 
     /// Takes hold of those that the collision procedure saw, and swirls those that it holds.
@@ -161,7 +161,7 @@ impl Actor for Tornado {
         &self.info
     }
 
-    /// The spheres, foot first, then the dust.
+    /// The spheres, foot first, the funnel, then the dust.
     fn bodies(&self) -> &[BodyId] {
         &self.bodies
     }
@@ -186,10 +186,6 @@ impl Actor for Tornado {
             self.update_fx(step)?;
         }
         Ok(())
-    }
-
-    fn appearance(&self) -> Appearance {
-        self.warping.shown()
     }
 
     fn when_lost(&self) -> WhenLost {
