@@ -57,7 +57,8 @@ pub struct SolverSettings {
     pub relaxation: f64,
     /// Sweeps of an iteration of [`Method::GaussSeidel`] and [`Method::Sor`].
     pub sweeps: usize,
-    /// Stiffness of joints, in reduced masses per dt². 1e4 stretches a loaded chain by 2 %, 1e5 tears ragdolls.
+    /// Stiffness that joints start a tick with, in reduced masses per dt²; they stiffen from there until they hold. 100 sheep
+    /// take 164, 185 and 209 Newton iterations a tick at 3e3, 1e4 and 3e4; at 3e3 a landing foot gets 25 mm deep.
     pub joint_stiffness: f64,
 }
 
@@ -149,7 +150,7 @@ impl Default for SolverSettings {
             forcing: 0.1,
             relaxation: 1.3,
             sweeps: 4,
-            joint_stiffness: 3e4,
+            joint_stiffness: 1e4,
         }
     }
 }

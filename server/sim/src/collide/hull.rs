@@ -46,11 +46,29 @@ pub(super) struct Hull {
     twist: Twist,
     /// Of the hull and of all that a tick may do to it; empty where the body takes no part.
     pub bounds: Bound,
+    /// How the tick moves it, as far as the second look asks.
+    pub stride: Stride,
+}
+
+/// Whether a tick moves a hull far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Stride {
+    /// By shifting or turning.
+    pub is_far: bool,
+    /// By turning alone.
+    pub turns_far: bool,
 }
 
 impl Hull {
     pub fn new(placed: Placed, owner: u32) -> Self {
-        Self { placed, owner, pose: Pose::IDENTITY, twist: Twist::REST, bounds: Bound::EMPTY }
+        Self {
+            placed,
+            owner,
+            pose: Pose::IDENTITY,
+            twist: Twist::REST,
+            bounds: Bound::EMPTY,
+            stride: Stride::default(),
+        }
     }
 
     /// Takes over where its body is now.

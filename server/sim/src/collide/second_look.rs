@@ -8,7 +8,7 @@
 
 use glam::DVec3;
 
-use super::hull::{Bodies, Hull};
+use super::hull::{Bodies, Hull, Stride};
 use super::material::MaterialTable;
 use super::narrow_phase::NarrowPhase;
 use super::shape::{Collider, Shape};
@@ -48,16 +48,18 @@ struct Side<'a> {
     collider: &'a Collider,
     pose: Pose,
     twist: Twist,
-    /// Whether it moves far by shifting or turning, and by turning alone.
-    moves: bool,
-    turns: bool,
 }
 
-impl<'a> Side<'a> {
-    fn of(hull: &Hull, candidates: &Candidates<'a>, dt: f64) -> Option<Self> {
-        let index = candidates.bodies.bodies.get(hull.placed.body)?.index;
-        let (pose, twist) = (*candidates.motions.get(index as usize)?)?;
-        let collider = candidates.bodies.collider(&hull.placed)?;
+impl<'a> Candidates<'a> {
+    fn side(&self, hull: &Hull) -> Option<Side<'a>> {
+        let index = self.bodies.bodies.get(hull.placed.body)?.index;
+        let (pose, twist) = (*self.motions.get(index as usize)?)?;
+        let collider = self.bodies.collider(&hull.placed)?;
+        Some(Side { serial: hull.placed.serial, owner: hull.owner, collider, pose, twist })
+    }
+
+    fn stride(&self, hull: &Hull, dt: f64) -> Stride {
+        let Some(Side { collider, pose, twist, .. }) = self.side(hull) else { return Stride::default() };
         // A surface of revolution stays where it is however fast it spins about its axis.
         let across = match (collider.shape(), collider.shape().revolution_axis()) {
             (Shape::Ball { .. }, _) => DVec3::ZERO,
@@ -66,42 +68,41 @@ impl<'a> Side<'a> {
         };
         let radius = collider.bounding_radius();
         let (turn, far) = (dt * across.length() * radius, MOVED * radius);
-        let moves = turn + dt * twist.linear.length() > far;
-        Some(Self { serial: hull.placed.serial, owner: hull.owner, collider, pose, twist, moves, turns: turn > far })
+        Stride { is_far: turn + dt * twist.linear.length() > far, turns_far: turn > far }
     }
 }
 
 impl Detector {
-    /// Looks again at the pairs of the tick where `candidates` has them. Answers whether points were added to
-    /// [`Detector::second`], where those of earlier looks stay.
+    /// Finds out what `candidates` move far. Answers whether there is something to look at again.
+    pub fn find_strides(&mut self, candidates: &Candidates, settings: &Settings) -> bool {
+        self.trees.set_strides(|hull| candidates.stride(hull, settings.dt))
+    }
+
+    /// Looks again at the pairs of the tick that move far, where `candidates` has them. Answers whether points were added
+    /// to [`Detector::second`], where those of earlier looks stay.
     pub fn look_again(&mut self, candidates: &Candidates, settings: &Settings) -> bool {
         let Self { trees, excluded, materials, statics, unbounded, contacts, second, narrow_phase, .. } = self;
-        let (known, dt) = (second.len(), settings.dt);
-        let mut look = Look { contacts, second, narrow_phase, dt };
+        let known = second.len();
+        let mut look = Look { contacts, second, narrow_phase, dt: settings.dt };
         let excludes = |a: u32, b: u32| excluded.binary_search(&(a.min(b), a.max(b))).is_ok();
-        for pair in trees.pairs_awake() {
-            let [Some(a), Some(b)] = pair.map(|hull| Side::of(hull, candidates, dt)) else { continue };
-            if (a.moves || b.moves) && !excludes(a.owner, b.owner) {
+        for pair in trees.pairs_awake().filter(|pair| pair.iter().any(|hull| hull.stride.is_far)) {
+            let [Some(a), Some(b)] = pair.map(|hull| candidates.side(hull)) else { continue };
+            if !excludes(a.owner, b.owner) {
                 look.at_pair(a, b, Partner::Body(b.serial), materials);
             }
         }
         let unbounded = trees.awake().flat_map(|hull| unbounded.iter().map(move |&id| (hull, id)));
         for (hull, id) in trees.pairs_awake_with_fixed().chain(unbounded) {
-            let (Some(a), piece) = (Side::of(hull, candidates, dt), &statics[id]) else { continue };
+            let piece = &statics[id];
             // Gaps to a half-space are linear in all motion but turns.
-            let moves = if matches!(piece.collider.shape(), Shape::HalfSpace { .. }) { a.turns } else { a.moves };
-            if moves {
-                let b = Side {
-                    serial: piece.serial,
-                    owner: piece.serial,
-                    collider: &piece.collider,
-                    pose: piece.pose,
-                    twist: Twist::REST,
-                    moves: false,
-                    turns: false,
-                };
-                look.at_pair(a, b, Partner::Static(piece.serial), materials);
+            let is_flat = matches!(piece.collider.shape(), Shape::HalfSpace { .. });
+            if !(if is_flat { hull.stride.turns_far } else { hull.stride.is_far }) {
+                continue;
             }
+            let Some(a) = candidates.side(hull) else { continue };
+            let (serial, collider, pose) = (piece.serial, &piece.collider, piece.pose);
+            let b = Side { serial, owner: serial, collider, pose, twist: Twist::REST };
+            look.at_pair(a, b, Partner::Static(serial), materials);
         }
         second.len() > known
     }

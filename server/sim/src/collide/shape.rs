@@ -127,7 +127,8 @@ impl Shape {
             Self::Box { half } => direction.abs().dot(*half),
             Self::Capsule { half_length, radius } => direction.x.abs() * half_length + radius,
             Self::Cylinder { half_length, radius, rounding } => {
-                let (along, across) = (direction.z.abs(), direction.x.hypot(direction.y));
+                let along = direction.z.abs();
+                let across = (1.0 - along * along).max(0.0).sqrt();
                 along * (half_length - rounding) + across * (radius - rounding) + rounding
             }
             Self::Hull { points, radius } => {

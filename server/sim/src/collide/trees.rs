@@ -9,7 +9,7 @@
 use glam::DVec3;
 use slab::Slab;
 
-use super::hull::{Bodies, Hull};
+use super::hull::{Bodies, Hull, Stride};
 use super::kdop_tree::{KdopTree, Leaf, PairSearch};
 use super::{Bound, SLABS, StaticId};
 use crate::dof::{BodyId, Placed};
@@ -253,6 +253,17 @@ impl Trees {
     /// All hulls that are awake.
     pub fn awake(&self) -> impl Iterator<Item = &Hull> {
         self.awake.iter().map(|&key| self.hull(key))
+    }
+
+    /// Tells every hull that is awake how the tick moves it. Answers whether one moves far.
+    pub fn set_strides(&mut self, stride: impl Fn(&Hull) -> Stride) -> bool {
+        let mut any = false;
+        for &key in &self.awake {
+            let hull = &mut self.entries[key as usize].hull;
+            hull.stride = stride(hull);
+            any |= hull.stride.is_far;
+        }
+        any
     }
 
     /// All pairs of hulls that are awake and whose bounds overlap, whatever the round.

@@ -31,9 +31,10 @@ pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: Gravity)
         Some(_) => start.rotation,
         None => torque_free_flow(start.rotation, before.angular, body.inertia, dt),
     };
-    let inertia = world_inertia(free_rotation, body.inertia);
-    let inverse_inertia = world_inertia(free_rotation, body.inertia.recip());
-    let momentum = world_inertia(start.rotation, body.inertia) * before.angular;
+    let axes = DMat3::from_quat(free_rotation);
+    let inertia = turned_out(axes, body.inertia);
+    let inverse_inertia = turned_out(axes, body.inertia.recip());
+    let momentum = world_product(start.rotation, body.inertia, before.angular);
     let carried_spin = inverse_inertia * momentum;
     let target = Twist {
         linear: before.linear + gravity.fall(dt) + dt * (body.force / body.mass),
@@ -72,13 +73,17 @@ pub(super) fn advance(body: &Body, node: &Node, u: Twist, dt: f64, state: &mut S
 /// Angular velocity at the end of a tick with twist `u` that ends with `rotation`: of the momentum that the body had, plus
 /// what the torques gave.
 pub(super) fn spin_after(body: &Body, node: &Node, u: Twist, rotation: DQuat) -> DVec3 {
-    world_inertia(rotation, body.inertia.recip()) * (node.inertia * u.angular)
+    world_product(rotation, body.inertia.recip(), node.inertia * u.angular)
 }
 
 /// R diag(principal) Rᵀ.
-fn world_inertia(rotation: DQuat, principal: DVec3) -> DMat3 {
-    let r = DMat3::from_quat(rotation);
+fn turned_out(r: DMat3, principal: DVec3) -> DMat3 {
     r * DMat3::from_diagonal(principal) * r.transpose()
+}
+
+/// R diag(principal) Rᵀ v.
+fn world_product(rotation: DQuat, principal: DVec3, v: DVec3) -> DVec3 {
+    rotation * (principal * (rotation.inverse() * v))
 }
 
 /// Rotation after `dt` without torque: RK4 on the quaternion with constant angular momentum.
@@ -86,7 +91,7 @@ fn torque_free_flow(rotation: DQuat, spin: DVec3, principal: DVec3, dt: f64) -> 
     if principal.x == principal.y && principal.y == principal.z {
         return (DQuat::from_scaled_axis(dt * spin) * rotation).normalize();
     }
-    let momentum = world_inertia(rotation, principal) * spin;
+    let momentum = world_product(rotation, principal, spin);
     let inverse = principal.recip();
     let rate = |r: DQuat| {
         // The stages of RK4 are no unit quaternions; what they lack in length must not scale the spin.

@@ -454,10 +454,8 @@ impl<const D: usize> Visitor for Evaluate<'_, D> {
     fn visit<T: Term>(&mut self, terms: &mut [T]) {
         for term in terms {
             let at = pair(self.frames, term);
-            if self.relinearise {
-                term.relinearise(self.dt, at);
-            }
-            let (energy, wrenches) = term.evaluate(self.dt, at);
+            let (energy, wrenches) =
+                if self.relinearise { term.relinearise_and_evaluate(self.dt, at) } else { term.evaluate(self.dt, at) };
             self.energy += energy;
             for (frame, wrench) in term.frames().into_iter().zip(wrenches) {
                 if let Some(entry) = self.residual.get_mut(frame as usize) {

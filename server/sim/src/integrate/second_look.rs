@@ -4,6 +4,7 @@
 use super::gather::{Spot, contact_spots};
 use super::solver::SolveReport;
 use super::step::{Integrator, Scene, Solve};
+use crate::collide::Detector;
 use crate::dof::{Pose, Twist};
 
 /// Memory of solving on.
@@ -46,15 +47,15 @@ impl Integrator {
     }
 
     /// Tells all contact points how wide their linear models believe them to be at the candidate.
-    pub fn tell_beliefs(&self, scene: &mut Scene) {
+    pub fn tell_beliefs(&self, detector: &mut Detector) {
         for solve in &self.solves[..self.islands.len()] {
             let problem = &solve.problem;
             let mut gaps = problem.terms.contacts.iter().map(|term| -term.final_depth(problem.dt, problem.pair(term)));
             for (&source, gap) in solve.contacts.iter().zip(&mut gaps) {
-                scene.contacts[source as usize].believed_gap = gap;
+                detector.contacts[source as usize].believed_gap = gap;
             }
             for (&source, gap) in solve.second.iter().zip(&mut gaps) {
-                scene.second[source as usize].contact.believed_gap = gap;
+                detector.second[source as usize].contact.believed_gap = gap;
             }
         }
     }

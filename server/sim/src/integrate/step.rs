@@ -15,6 +15,7 @@ use super::solver::{SolveReport, Solvers, StoppedBecause};
 use crate::collide::{ContactPoint, SecondPoint};
 use crate::dof::{Body, BodyId, Placed};
 use crate::island::Islands;
+use crate::potential::contact::Outcome;
 use crate::potential::hold::{Joint, Memory};
 use crate::potential::{
     AngleLimitId, BallJointId, DistanceLimitId, FixedJointId, HingeId, Potentials, RodId, SliderId, UniversalJointId,
@@ -265,15 +266,18 @@ impl Solve {
     /// Hands back what potentials remember, and looks how well they hold.
     fn write_back(&self, scene: &mut Scene, report: &mut StepReport) {
         let (problem, dt) = (&self.problem, self.problem.dt);
-        for (term, &source) in problem.terms.contacts.iter().zip(&self.contacts) {
-            let (contact, at) = (&mut scene.contacts[source as usize], problem.pair(term));
-            contact.anchor = finite_or_zero(term.final_anchor(dt, at));
-            contact.blow = term.final_blow(dt, at);
-            contact.stiffening = finite_or_zero(DVec3::X * term.final_stiffening(dt, at)).x;
-            contact.normal_force = finite_or_zero(DVec3::X * term.normal_force(dt, at)).x;
+        let mut outcomes = problem.terms.contacts.iter().map(|term| term.outcome(dt, problem.pair(term)));
+        for (&source, outcome) in self.contacts.iter().zip(&mut outcomes) {
+            let Outcome { normal_force, depth, anchor, stiffening, blow } = outcome;
+            let contact = &mut scene.contacts[source as usize];
+            contact.anchor = finite_or_zero(anchor);
+            contact.blow = blow;
+            contact.stiffening = if stiffening.is_finite() { stiffening } else { 0.0 };
+            contact.normal_force = if normal_force.is_finite() { normal_force } else { 0.0 };
+            report.worst_penetration = report.worst_penetration.max(depth);
         }
-        let depths = problem.terms.contacts.iter().map(|term| term.final_depth(dt, problem.pair(term)));
-        report.worst_penetration = depths.fold(report.worst_penetration, f64::max);
+        // Points of the second look live for one tick.
+        report.worst_penetration = outcomes.map(|outcome| outcome.depth).fold(report.worst_penetration, f64::max);
         for (term, &contact) in problem.terms.rolling.iter().zip(&self.rolling) {
             let source = self.contacts[contact as usize];
             scene.contacts[source as usize].turn = finite_or_zero(term.final_anchor(dt, problem.pair(term)));

@@ -127,9 +127,10 @@ fn depth_under(f: f64, w: f64) -> f64 {
     if f >= 2.0 / 3.0 {
         return (f + 1.0 / 3.0) * w;
     }
-    // Newton from above: the spline is convex there.
     let step = |x: f64| x - (x * x * (1.0 - x / 3.0) - f) / (x * (2.0 - x)).max(f64::MIN_POSITIVE);
-    (0..4).fold((1.5 * f).sqrt(), |x, _| step(x)) * w
+    let root = f.sqrt();
+    // Within 3 % already; Newton's two steps leave 1e-6.
+    step(step(root * (1.0 + root / 6.0))) * w
 }
 
 /// Derivative of the spline's force.
@@ -270,6 +271,25 @@ impl ContactTerm {
         (slip, length, length * (self.tangent_stiffness / self.limit.max(1e-300)))
     }
 
+    /// Energy and gradient where the normal spline has this integral and value.
+    // The innermost loop of all: what is not asked for of the answer need not be written to memory.
+    #[inline(always)]
+    fn pushes<S: Scalar>(&self, displacement: Vec3<S>, (integral, value): (S, S)) -> (S, [Wrench<S>; 2]) {
+        let mut energy = integral * self.normal_stiffness;
+        let mut force = Vec3::constant(self.normal).scale(-value * self.normal_stiffness);
+        if self.limit > 0.0 {
+            let (slip, length, x) = self.slip(displacement);
+            let (integral, value) = friction_patch(x);
+            energy += integral * (self.limit * self.limit / self.tangent_stiffness);
+            if length.value() > 0.0 {
+                force += slip.scale(value * self.limit / length);
+            }
+        }
+        // Nobody asks for what acts on the world.
+        let on_b = if self.on_world() { Wrench::ZERO } else { Wrench::at_fixed(force, self.arms[1]) };
+        (energy, [Wrench::at_fixed(-force, self.arms[0]), on_b])
+    }
+
     /// Normal force, N.
     #[inline]
     pub fn normal_force(&self, dt: f64, at: [&Frame<f64>; 2]) -> f64 {
@@ -292,11 +312,22 @@ impl ContactTerm {
         self.start_gap = self.loaded_gap;
     }
 
-    /// How much stiffer than the settings' it is to be in the next tick, so that the load takes up its share of the
-    /// tolerance.
-    pub fn final_stiffening(&self, dt: f64, at: [&Frame<f64>; 2]) -> f64 {
-        let ratio = self.depth(self.displacement(dt, at)) / (SHARE * self.tolerance);
-        let force = self.normal_force(dt, at);
+    /// What comes of it at the end of the tick.
+    pub fn outcome(&self, dt: f64, at: [&Frame<f64>; 2]) -> Outcome {
+        let displacement = self.displacement(dt, at);
+        let depth = self.depth(displacement);
+        let normal_force = self.normal_stiffness * normal_spline(depth, self.transition).1;
+        Outcome {
+            normal_force,
+            depth: depth + self.excess_depth,
+            anchor: self.final_anchor(displacement, normal_force),
+            stiffening: self.final_stiffening(depth, normal_force),
+            blow: self.final_blow(-displacement.along(self.normal) / dt, normal_force * dt),
+        }
+    }
+
+    fn final_stiffening(&self, depth: f64, force: f64) -> f64 {
+        let ratio = depth / (SHARE * self.tolerance);
         let is_steady = self.start_speed.abs() < RESTING_SPEED && (force - self.last_force).abs() < CHANGE * force;
         let next = match ratio {
             _ if !is_steady => ratio.clamp(FOLLOW.0, 1.0),
@@ -306,22 +337,32 @@ impl ContactTerm {
         (self.stiffening * next).clamp(1.0, self.most_stiffening)
     }
 
-    /// The blow that the bodies gave each other in this tick, for the next.
-    pub fn final_blow(&self, dt: f64, at: [&Frame<f64>; 2]) -> Blow {
-        if self.owed == 0.0 {
-            return Blow::default();
-        }
-        let (impulse, end) = (self.normal_force(dt, at) * dt, -self.displacement(dt, at).along(self.normal) / dt);
-        let work = impulse * (self.start_speed + end) / 2.0;
-        if work > 0.0 { Blow { owed: self.owed, work } } else { Blow::default() }
+    /// `speed` is that at which it closed at the end, m/s, `impulse` in N s.
+    fn final_blow(&self, speed: f64, impulse: f64) -> Blow {
+        let work = impulse * (self.start_speed + speed) / 2.0;
+        if self.owed != 0.0 && work > 0.0 { Blow { owed: self.owed, work } } else { Blow::default() }
     }
 
-    /// The anchor for the next tick: the slip, pulled along at the cone.
-    pub fn final_anchor(&self, dt: f64, at: [&Frame<f64>; 2]) -> DVec3 {
-        let (slip, length, _) = self.slip(self.displacement(dt, at));
-        let reach = SATURATION * self.friction * self.normal_force(dt, at) / self.tangent_stiffness;
+    fn final_anchor(&self, displacement: Vec3<f64>, normal_force: f64) -> DVec3 {
+        let (slip, length, _) = self.slip(displacement);
+        let reach = SATURATION * self.friction * normal_force / self.tangent_stiffness;
         DVec3::from(slip) * if length > reach { reach / length } else { 1.0 }
     }
+}
+
+/// What comes of a contact point, most of it for the next tick.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Outcome {
+    /// N.
+    pub normal_force: f64,
+    /// Depth, m; negative where it is open.
+    pub depth: f64,
+    /// The slip, pulled along at the cone, m.
+    pub anchor: DVec3,
+    /// How much stiffer than the settings' it is to be, so that the load takes up its share of the tolerance.
+    pub stiffening: f64,
+    /// That the bodies gave each other.
+    pub blow: Blow,
 }
 
 /// How friction at a contact changes beyond what [`Term::hessian`] says: with the normal force, and along the slip by the
@@ -372,24 +413,23 @@ impl Term for ContactTerm {
         self.frames
     }
 
-    // The innermost loop of all: what is not asked for of the answer need not be written to memory.
     #[inline(always)]
     fn evaluate<S: Scalar>(&self, dt: f64, at: [&Frame<S>; 2]) -> (S, [Wrench<S>; 2]) {
         let displacement = self.displacement(dt, at);
-        let (integral, value) = normal_spline(self.depth(displacement), self.transition);
-        let mut energy = integral * self.normal_stiffness;
-        let mut force = Vec3::constant(self.normal).scale(-value * self.normal_stiffness);
-        if self.limit > 0.0 {
-            let (slip, length, x) = self.slip(displacement);
-            let (integral, value) = friction_patch(x);
-            energy += integral * (self.limit * self.limit / self.tangent_stiffness);
-            if length.value() > 0.0 {
-                force += slip.scale(value * self.limit / length);
-            }
-        }
-        // Nobody asks for what acts on the world.
-        let on_b = if self.on_world() { Wrench::ZERO } else { Wrench::at_fixed(force, self.arms[1]) };
-        (energy, [Wrench::at_fixed(-force, self.arms[0]), on_b])
+        self.pushes(displacement, normal_spline(self.depth(displacement), self.transition))
+    }
+
+    #[inline]
+    fn relinearise(&mut self, dt: f64, at: [&Frame<f64>; 2]) {
+        self.limit = self.friction * self.normal_force(dt, at);
+    }
+
+    #[inline(always)]
+    fn relinearise_and_evaluate(&mut self, dt: f64, at: [&Frame<f64>; 2]) -> (f64, [Wrench; 2]) {
+        let displacement = self.displacement(dt, at);
+        let normal = normal_spline(self.depth(displacement), self.transition);
+        self.limit = self.friction * self.normal_stiffness * normal.1;
+        self.pushes(displacement, normal)
     }
 
     fn hessian(&self, dt: f64, at: [&Frame<f64>; 2]) -> PairBlocks {
@@ -409,11 +449,6 @@ impl Term for ContactTerm {
             }
         }
         PairBlocks::of_points(k, self.arms[0], self.arms[1])
-    }
-
-    #[inline]
-    fn relinearise(&mut self, dt: f64, at: [&Frame<f64>; 2]) {
-        self.limit = self.friction * self.normal_force(dt, at);
     }
 
     fn stiffen(&mut self, dt: f64, at: [&Frame<f64>; 2]) -> bool {

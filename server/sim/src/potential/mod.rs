@@ -278,6 +278,12 @@ pub(crate) trait Term {
     /// Takes what is held fixed during a Newton iteration from the candidate at its start.
     fn relinearise(&mut self, _dt: f64, _at: [&Frame<f64>; 2]) {}
 
+    /// [`Term::relinearise`] and [`Term::evaluate`] in one.
+    fn relinearise_and_evaluate(&mut self, dt: f64, at: [&Frame<f64>; 2]) -> (f64, [Wrench; 2]) {
+        self.relinearise(dt, at);
+        self.evaluate(dt, at)
+    }
+
     /// Hears of the Newton step that the linear model proposes, as displacements of both frames, m and rad.
     fn propose(&mut self, _step: [Twist; 2]) {}
 

@@ -104,11 +104,14 @@ impl World {
         integrator.begin(&mut scene);
         for _ in 0..SECOND_LOOKS {
             let first = self.detector.second.len();
-            let (integrator, mut scene) = self.scene();
-            integrator.tell_beliefs(&mut scene);
+            let (integrator, scene) = self.scene();
             integrator.find_candidates(&scene);
             let bodies = Bodies { bodies: &self.bodies, state: &self.state };
             let candidates = Candidates { bodies, motions: self.integrator.candidates() };
+            if !self.detector.find_strides(&candidates, &self.settings) {
+                break;
+            }
+            self.integrator.tell_beliefs(&mut self.detector);
             if !self.detector.look_again(&candidates, &self.settings) {
                 break;
             }

@@ -20,9 +20,9 @@ const VECTORS_AN_ITERATION: u64 = 2;
 /// Passes over vectors in each step of a line search: copy, add, product.
 const VECTORS_A_TRIAL: u64 = 3;
 
-/// Most times that open joints of an island are stiffened in a tick: in 5, a link of a gram comes to hold ten tonnes
+/// Most times that open joints of an island are stiffened in a tick: in 6, a link of a gram comes to hold ten tonnes
 /// that it meets for the first time.
-const STIFFENING_ROUNDS: usize = 6;
+const STIFFENING_ROUNDS: usize = 7;
 
 /// Share of the tolerance that a guess must be within to be taken as it is. The error of an iterate has any sign, that
 /// of a repeated guess repeats: it makes what slides slide too slowly by the tolerance in every tick.
