@@ -66,7 +66,7 @@ pub fn with_flock(me: DVec3, mates: impl Iterator<Item = Mate>) -> DVec3 {
 /// Which way threats drive it: zero where nothing frightens it, longer the closer they are.
 pub fn away_from(me: DVec3, threats: impl Iterator<Item = Threat>) -> DVec3 {
     let mut away = DVec3::ZERO;
-    for threat in threats {
+    for threat in threats.filter(|threat| threat.radius > 0.0) {
         let (now, then) = (threat.position, threat.position + threat.velocity * FORESIGHT);
         let nearest = if then.distance_squared(me) < now.distance_squared(me) { then } else { now };
         let apart = (me - nearest).with_y(0.0);
