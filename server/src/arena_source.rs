@@ -1,11 +1,24 @@
-//! Where an arena comes from: compiled in by name, or a file.
+//! Where an arena comes from: compiled in by name, or a file with what lies beside it.
+//!
+//! Owns all that reads arenas from the disk: only plain files, of bounded size, and of meshes only those in the folder
+//! of the arena's file or below.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
 
-use pita_game::{Arena, ArenaError, ArenaSettings};
+use pita_game::arena_file::{self, FILE_MAX};
+use pita_game::{ActorKinds, Arena, ArenaError, ArenaSettings, Supplies};
+use pita_sim::geometry::FILE_MAX as GEOMETRY_MAX;
 
-/// Names and texts of the compiled-in arenas.
-pub const BUILT_IN: [(&str, &str); 1] = [("proving-ground", Arena::DEFAULT)];
+/// Names and texts of the compiled-in arenas; the first is the default.
+pub const BUILT_IN: [(&str, &str); 4] = [
+    ("proving-ground", Arena::DEFAULT),
+    ("desert-town", include_str!("../../configs/arenas/desert-town.toml")),
+    ("sheep-pasture", include_str!("../../configs/arenas/sheep-pasture.toml")),
+    ("stress", include_str!("../../configs/arenas/stress.toml")),
+];
 
 /// Why there is no arena.
 #[derive(Debug, thiserror::Error)]
@@ -16,7 +29,7 @@ pub enum SourceError {
         /// What was asked for.
         source_name: String,
         /// Why it is no file.
-        reason: std::io::Error,
+        reason: io::Error,
     },
     /// The file is no arena.
     #[error("{file}: {reason}")]
@@ -28,27 +41,84 @@ pub enum SourceError {
     },
 }
 
-/// Builds the arena called `source`: a built-in name, else a path. Answers its text too.
-///
-/// # Errors
-/// [`SourceError`].
-pub fn load(source: &str, settings: &ArenaSettings) -> Result<(Arena, String), SourceError> {
-    match BUILT_IN.iter().find(|(name, _)| *name == source) {
-        Some((name, text)) => Ok((parse(text, &format!("built-in arena {name}"), settings)?, (*text).to_owned())),
-        None => {
-            let unreadable = |reason| SourceError::Unreadable { source_name: source.to_owned(), reason };
-            let text = std::fs::read_to_string(Path::new(source)).map_err(unreadable)?;
-            Ok((parse(&text, source, settings)?, text))
-        }
+/// Text of an arena, and where it is from.
+#[derive(Clone, Debug)]
+pub struct ArenaText {
+    /// What errors call it.
+    label: String,
+    /// TOML.
+    pub text: String,
+    /// Where its meshes are; nowhere for what is compiled in.
+    folder: Option<PathBuf>,
+}
+
+impl ArenaText {
+    /// The arena called `source`: a built-in name, else a path; with `given` in place of the defaults of its parameters.
+    ///
+    /// # Errors
+    /// [`SourceError`].
+    pub fn find(source: &str, given: &BTreeMap<String, i64>) -> Result<Self, SourceError> {
+        let found = match BUILT_IN.iter().find(|(name, _)| *name == source) {
+            Some(&(name, text)) => Self::built_in(name, text),
+            None => {
+                let unreadable = |reason| SourceError::Unreadable { source_name: source.to_owned(), reason };
+                let bytes = read_bounded(Path::new(source), FILE_MAX).map_err(unreadable)?;
+                let text = String::from_utf8(bytes).map_err(|e| unreadable(io::Error::other(e)))?;
+                Self::of_file(Path::new(source), text)
+            }
+        };
+        let text = arena_file::with_parameters(&found.text, given).map_err(|reason| found.invalid(reason))?;
+        Ok(Self { text, ..found })
+    }
+
+    /// An arena that is compiled in.
+    pub fn built_in(name: &str, text: &str) -> Self {
+        Self { label: format!("built-in arena {name}"), text: text.to_owned(), folder: None }
+    }
+
+    /// What was read from the file at `path`.
+    pub fn of_file(path: &Path, text: String) -> Self {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Self { label: path.display().to_string(), text, folder: Some(folder.to_owned()) }
+    }
+
+    /// Builds the arena.
+    ///
+    /// # Errors
+    /// [`SourceError::Invalid`].
+    pub fn build(&self, settings: &ArenaSettings) -> Result<Arena, SourceError> {
+        let read = |name: &str| match &self.folder {
+            Some(folder) => read_beside(folder, name).map_err(|reason| reason.to_string()),
+            None => Err("a built-in arena has no folder".to_owned()),
+        };
+        let supplies = Supplies { kinds: &ActorKinds::built_in(), read: &read };
+        Arena::from_toml_with(&self.text, settings, &supplies).map_err(|reason| self.invalid(reason))
+    }
+
+    fn invalid(&self, reason: ArenaError) -> SourceError {
+        SourceError::Invalid { file: self.label.clone(), reason }
     }
 }
 
-/// Builds an arena from `text`; errors call it `file`.
-///
-/// # Errors
-/// [`SourceError::Invalid`].
-pub fn parse(text: &str, file: &str, settings: &ArenaSettings) -> Result<Arena, SourceError> {
-    Arena::from_toml(text, settings).map_err(|reason| SourceError::Invalid { file: file.to_owned(), reason })
+/// The bytes of a file in `folder` or below it; a link does not lead out of it.
+fn read_beside(folder: &Path, name: &str) -> io::Result<Vec<u8>> {
+    let folder = folder.canonicalize()?;
+    let path = folder.join(name).canonicalize()?;
+    if !path.starts_with(&folder) {
+        return Err(io::Error::other("it leads out of the arena's folder"));
+    }
+    read_bounded(&path, GEOMETRY_MAX)
+}
+
+/// The bytes of a plain file, and one byte more than `max` where it is longer, which is refused by who knows what it is.
+fn read_bounded(path: &Path, max: usize) -> io::Result<Vec<u8>> {
+    // Asked before it is opened: opening a pipe waits for who writes into it.
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(io::Error::other("it is no plain file"));
+    }
+    let mut bytes = Vec::new();
+    File::open(path)?.take(max as u64 + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 fn names() -> String {

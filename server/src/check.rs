@@ -7,9 +7,10 @@ use comfy_table::{Table, presets};
 use pita_game::ArenaSettings;
 use serde_json::json;
 
+use crate::arena_source::{ArenaText, BUILT_IN};
 use crate::cli::CheckArgs;
 use crate::config::{self, ServerConfig};
-use crate::{arena_source, report};
+use crate::report;
 
 /// Where configuration lies in a checkout.
 const CONFIGS: &str = "configs";
@@ -56,9 +57,9 @@ pub fn run(args: &CheckArgs) -> ExitCode {
 }
 
 fn check_built_in(into: &mut Vec<Checked>) {
-    into.push(check_text(config::BUILT_IN.to_owned(), Kind::Server, config::DEFAULT_TEXT));
-    for (name, text) in arena_source::BUILT_IN {
-        into.push(check_text(format!("built-in arena {name}"), Kind::Arena, text));
+    into.push(check_server(config::BUILT_IN.to_owned(), Kind::Server, config::DEFAULT_TEXT));
+    for (name, text) in BUILT_IN {
+        into.push(check_arena(format!("built-in arena {name}"), &ArenaText::built_in(name, text)));
     }
 }
 
@@ -97,7 +98,10 @@ fn toml_files(folder: &Path) -> Vec<PathBuf> {
 fn check_file(path: &Path) -> Checked {
     let file = path.display().to_string();
     match std::fs::read_to_string(path) {
-        Ok(text) => check_text(file, kind_of(path, &text), &text),
+        Ok(text) => match kind_of(path, &text) {
+            Kind::Arena => check_arena(file, &ArenaText::of_file(path, text)),
+            kind => check_server(file, kind, &text),
+        },
         Err(error) => Checked { problem: Some(format!("{file}: {error}")), kind: Kind::Unknown, file },
     }
 }
@@ -118,13 +122,14 @@ fn kind_of(path: &Path, text: &str) -> Kind {
     }
 }
 
-fn check_text(file: String, kind: Kind, text: &str) -> Checked {
-    let settings = ArenaSettings { tick_hz: 30, threads: 1 };
-    let problem = match kind {
-        Kind::Server | Kind::Unknown => ServerConfig::parse(text, &file).err().map(|error| error.to_string()),
-        Kind::Arena => arena_source::parse(text, &file, &settings).err().map(|error| error.to_string()),
-    };
+fn check_server(file: String, kind: Kind, text: &str) -> Checked {
+    let problem = ServerConfig::parse(text, &file).err().map(|error| error.to_string());
     Checked { file, kind, problem }
+}
+
+fn check_arena(file: String, text: &ArenaText) -> Checked {
+    let problem = text.build(&ArenaSettings { tick_hz: 30, threads: 1 }).err().map(|error| error.to_string());
+    Checked { file, kind: Kind::Arena, problem }
 }
 
 fn json_of(checked: &[Checked]) -> String {

@@ -44,6 +44,9 @@ pub struct RunArgs {
     /// Name of a built-in arena, or path of an arena file
     #[arg(long, value_name = "NAME|FILE")]
     pub arena: Option<String>,
+    /// A parameter of the arena; may be given several times
+    #[arg(long = "set", value_name = "NAME=NUMBER", value_parser = parameter)]
+    pub parameters: Vec<(String, i64)>,
     /// Ticks a second
     #[arg(long, value_name = "30|25")]
     pub tick_hz: Option<TickRate>,
@@ -65,6 +68,9 @@ pub struct SimulateArgs {
     /// A .scene file, an arena file, or the name of a built-in arena
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
+    /// A parameter of the arena; may be given several times
+    #[arg(long = "set", value_name = "NAME=NUMBER", value_parser = parameter)]
+    pub parameters: Vec<(String, i64)>,
     /// Ticks to run; the scene's own number, or a minute of an arena, where it is not given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub ticks: Option<u32>,
@@ -91,6 +97,12 @@ pub struct StatusArgs {
     /// Print JSON instead of a table
     #[arg(long)]
     pub json: bool,
+}
+
+/// `size=20`.
+fn parameter(text: &str) -> Result<(String, i64), String> {
+    let parts = text.split_once('=').and_then(|(name, number)| Some((name.to_owned(), number.parse().ok()?)));
+    parts.ok_or_else(|| "expected a name, =, and a whole number: size=20".to_owned())
 }
 
 impl Cli {

@@ -5,6 +5,7 @@
 
 mod within;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -57,6 +58,8 @@ pub struct Network {
 pub struct ArenaChoice {
     /// Built-in name or path.
     pub source: String,
+    /// What is chosen of the arena's parameters, by name.
+    pub parameters: BTreeMap<String, i64>,
     /// Threads that integrate.
     pub threads: Within<1, 64>,
 }

@@ -13,7 +13,7 @@ use pita_protocol::message::ArenaSource;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::oneshot;
 
-use crate::arena_source::{self, SourceError};
+use crate::arena_source::{ArenaText, SourceError};
 use crate::cli::RunArgs;
 use crate::config::{ConfigError, ServerConfig};
 use crate::network::{self, NetworkError};
@@ -104,12 +104,14 @@ fn configure(args: &RunArgs) -> Result<Configured, DaemonError> {
     if let Some(arena) = &args.arena {
         config.arena.source.clone_from(arena);
     }
+    config.arena.parameters.extend(args.parameters.iter().cloned());
     if let Some(rate) = args.tick_hz {
         config.tick.tick_hz = rate;
     }
     let settings = ArenaSettings { tick_hz: config.tick.tick_hz.hz(), threads: config.arena.threads.get() as usize };
-    let (arena, source) = arena_source::load(&config.arena.source, &settings)?;
-    Ok(Configured { config, arena, source })
+    let text = ArenaText::find(&config.arena.source, &config.arena.parameters)?;
+    let arena = text.build(&settings)?;
+    Ok(Configured { config, arena, source: text.text })
 }
 
 /// What is to run.

@@ -6,20 +6,21 @@ use std::process::ExitCode;
 use comfy_table::{Table, presets};
 use indicatif::{ProgressBar, ProgressStyle};
 use pita_game::scene::{Scene, SceneError};
-use pita_game::{Arena, ArenaSettings, Command, Ports, Stage, pipeline};
+use pita_game::{Arena, ArenaSettings, Command, LogicReport, Ports, Stage, pipeline};
 use pita_sim::{Energy, Momentum, Settings, StepReport, World};
 use serde_json::json;
 
+use crate::arena_source::{ArenaText, SourceError};
 use crate::cli::SimulateArgs;
+use crate::report;
 use crate::trace::{self, Trace, TraceError};
-use crate::{arena_source, report};
 
 /// Why a run cannot start or go on.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulateError {
     /// No such arena, or it is not valid.
     #[error(transparent)]
-    Arena(#[from] arena_source::SourceError),
+    Arena(#[from] SourceError),
     /// The scene file cannot be read.
     #[error("{file}: {reason}")]
     Unreadable {
@@ -63,7 +64,9 @@ impl Subject {
         let tick_hz = args.tick_hz.hz();
         if args.scene.extension().is_none_or(|extension| extension != "scene") {
             let settings = ArenaSettings { tick_hz, threads: usize::from(args.threads) };
-            return Ok(Self::Arena(Box::new(arena_source::load(&args.scene.to_string_lossy(), &settings)?.0)));
+            let given = args.parameters.iter().cloned().collect();
+            let text = ArenaText::find(&args.scene.to_string_lossy(), &given)?;
+            return Ok(Self::Arena(Box::new(text.build(&settings)?)));
         }
         let file = args.scene.display().to_string();
         let text = std::fs::read_to_string(&args.scene)
@@ -79,6 +82,14 @@ impl Subject {
         match self {
             Self::Scene(scene) => &scene.world,
             Self::Arena(arena) => arena.world(),
+        }
+    }
+
+    /// What logic did; nothing in a scene.
+    fn logic(&self) -> LogicReport {
+        match self {
+            Self::Scene(_) => LogicReport::default(),
+            Self::Arena(arena) => *arena.logic(),
         }
     }
 
@@ -123,6 +134,7 @@ fn simulate(args: &SimulateArgs) -> Result<Summary, SimulateError> {
     for _ in 0..ticks {
         let took = trace::time(|| subject.tick());
         summary.add(took.wall_ms, subject.world().report());
+        summary.watch(&subject);
         if let Some(trace) = &mut trace {
             trace.record_time(took)?;
             trace.record(subject.world())?;
@@ -152,6 +164,14 @@ struct Summary {
     total: StepReport,
     bodies: usize,
     dof: usize,
+    /// Speed of the fastest body at the end of any tick, m/s.
+    fastest: f64,
+    /// Most kinetic energy at the end of any tick, J.
+    liveliest: f64,
+    /// Sporadic jobs of all ticks.
+    sporadic: usize,
+    /// Actors that were put back, or taken away, because they left the bounds or were quarantined.
+    lost: usize,
     state_hash: u64,
 }
 
@@ -166,6 +186,10 @@ impl Summary {
             total: StepReport::default(),
             bodies: 0,
             dof: 0,
+            fastest: 0.0,
+            liveliest: 0.0,
+            sporadic: 0,
+            lost: 0,
             state_hash: 0,
         }
     }
@@ -182,6 +206,15 @@ impl Summary {
         self.total.worst_joint_gap = self.total.worst_joint_gap.max(tick.worst_joint_gap);
         self.total.residual = self.total.residual.max(tick.residual);
         self.dof = self.dof.max(tick.dof);
+    }
+
+    fn watch(&mut self, subject: &Subject) {
+        let (world, logic) = (subject.world(), subject.logic());
+        let speeds = world.bodies().iter().filter_map(|&id| world.velocity(id)).map(|velocity| velocity.length());
+        self.fastest = speeds.fold(self.fastest, f64::max);
+        self.liveliest = self.liveliest.max(world.energy().kinetic);
+        self.sporadic += logic.sporadic;
+        self.lost += logic.lost;
     }
 
     fn finish(&mut self, world: &World) {
@@ -226,6 +259,10 @@ impl Summary {
             "linear_iterations_per_tick": self.mean(self.total.linear_iterations),
             "unconverged_islands": self.total.unconverged_islands,
             "quarantined": self.total.quarantined,
+            "fastest_m_per_s": self.fastest,
+            "kinetic_energy_max_J": self.liveliest,
+            "lost_actors": self.lost,
+            "sporadic_jobs_per_tick": self.mean(self.sporadic),
             // A 64-bit hash does not survive readers that know numbers only as f64.
             "state_hash": format!("{:016x}", self.state_hash),
         });
@@ -264,6 +301,9 @@ impl Summary {
             ("linear iterations a tick", format!("{:.2}", self.mean(self.total.linear_iterations))),
             ("unconverged islands", self.total.unconverged_islands.to_string()),
             ("quarantined bodies", self.total.quarantined.to_string()),
+            ("fastest body, most energy of motion", format!("{:.1} m/s, {:.3e} J", self.fastest, self.liveliest)),
+            ("actors lost", self.lost.to_string()),
+            ("sporadic jobs a tick", format!("{:.2}", self.mean(self.sporadic))),
             ("state hash", format!("{:016x}", self.state_hash)),
         ];
         for (name, value) in rows {

@@ -6,8 +6,10 @@
 mod build;
 mod collisions;
 mod logic;
+mod placing;
 mod players;
 mod rehearsed;
+mod reload;
 
 use std::collections::BTreeMap;
 
@@ -21,6 +23,10 @@ use crate::pipeline::Ports;
 use crate::spawn::Pose;
 use crate::step::{Effect, LogicReport, Other, Request};
 use crate::vehicle::VehicleParameters;
+
+pub use build::Supplies;
+use placing::Placed;
+pub use reload::{Reload, ReloadError};
 
 /// What the caller decides about an arena, not its file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,6 +130,10 @@ pub struct Arena {
     others: Vec<Other>,
     requests: Vec<Request>,
     logic: LogicReport,
+    /// What the file placed.
+    placed: Placed,
+    /// What the coming tick changes about that.
+    reload: Option<Box<Reload>>,
     /// Likewise: collisions of this tick.
     collisions: Vec<Collision>,
 }
@@ -195,6 +205,7 @@ impl Arena {
     /// Stage 1: takes the commands that came in since the last tick and applies them.
     pub(crate) fn collect_input(&mut self, ports: &mut impl Ports) {
         self.events.clear();
+        self.reload_if_scheduled();
         let mut commands = std::mem::take(&mut self.commands);
         ports.collect(self.ticks + 1, &mut commands);
         for command in commands.drain(..) {

@@ -5,18 +5,28 @@
 //!
 //! Every key is described, with unit and range, in `configs/arenas/proving-ground.toml`.
 
+mod block;
 mod checks;
 mod key;
 pub(crate) mod material;
+mod meshes;
+mod parameters;
 mod shape;
+mod sleep;
 mod solver;
 mod tables;
 
+use std::collections::BTreeMap;
+
 use pita_sim::SimError;
 
+pub use block::Block;
+pub use checks::ACTORS_MAX;
 pub use key::Key;
 pub use material::{MaterialFile, MaterialPairFile, Materials};
+pub use parameters::{ParameterFile, with_parameters};
 pub use shape::{Angles, ShapeFile};
+pub use sleep::SleepFile;
 pub use solver::SolverFile;
 pub use tables::{ActorFile, ArenaFile, BoundsFile, DriverFile, RouteFile, SpawnFile, SpawnGridFile, StaticFile};
 
@@ -67,13 +77,13 @@ pub enum ArenaError {
 }
 
 impl ArenaFile {
-    /// Reads and checks.
+    /// Reads and checks, with the defaults of parameters that are still in the text.
     ///
     /// # Errors
     /// [`ArenaError::Syntax`] and [`ArenaError::OutOfRange`].
     pub fn parse(text: &str) -> Result<Self, ArenaError> {
-        Key::new("length of the file").count(text.len(), 1, FILE_MAX, "bytes")?;
-        let file: Self = toml::from_str(text).map_err(|e| syntax_error(text, &e))?;
+        let text = with_parameters(text, &BTreeMap::new())?;
+        let file: Self = toml::from_str(&text).map_err(|e| syntax_error(&text, &e))?;
         file.check()?;
         Ok(file)
     }

@@ -12,7 +12,7 @@ use serde::de::DeserializeOwned;
 use crate::actor::{Actor, ActorInfo};
 use crate::arena_file::{ActorFile, ArenaError, ArenaFile, Key, Materials};
 use crate::part::PartInfo;
-use crate::prop::Prop;
+use crate::prop::{Barrel, Crate, Drawbridge, Fence, Jelly, Prop, Seesaw};
 use crate::sheep::Sheep;
 use crate::spawn::Pose;
 use crate::tornado::Tornado;
@@ -23,7 +23,7 @@ pub trait ActorKind: Actor + Sized + 'static {
     const KIND: &'static str;
 
     /// The kind's own keys; `#[serde(deny_unknown_fields)]` makes a misspelt key an error.
-    type Parameters: DeserializeOwned + 'static;
+    type Parameters: DeserializeOwned + Send + 'static;
 
     /// Whether the parameters are in range, and what they name exists; `key` is the path of the table in the file.
     ///
@@ -67,7 +67,7 @@ impl Site<'_> {
 }
 
 /// Adds an actor of a table that was read and checked.
-pub(crate) type Recipe = Box<dyn Fn(&mut Site) -> Result<Box<dyn Actor>, SimError>>;
+pub(crate) type Recipe = Box<dyn Fn(&mut Site) -> Result<Box<dyn Actor>, SimError> + Send>;
 
 type Read = fn(toml::Table, &Key, &ArenaFile) -> Result<Recipe, ArenaError>;
 
@@ -83,7 +83,9 @@ impl ActorKinds {
 
     /// The kinds that come with the game.
     pub fn built_in() -> Self {
-        Self::none().with::<Prop>().with::<Sheep>().with::<Tornado>()
+        let loose = Self::none().with::<Prop>().with::<Crate>().with::<Barrel>();
+        let held = loose.with::<Fence>().with::<Seesaw>().with::<Drawbridge>().with::<Jelly>();
+        held.with::<Sheep>().with::<Tornado>()
     }
 
     /// These kinds and `K`, which takes the place of one that has its name.

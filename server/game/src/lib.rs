@@ -13,6 +13,7 @@ pub mod actor;
 pub mod arena;
 pub mod arena_file;
 pub mod assembly;
+pub mod breakable;
 pub mod controls;
 pub mod driver;
 pub mod free_form;
@@ -31,7 +32,7 @@ pub mod tornado;
 pub mod vehicle;
 
 pub use actor::{Actor, ActorInfo, Contact, ContactSide, Partner, Response, WhenLost};
-pub use arena::{Arena, ArenaEvent, ArenaSettings, Command, StaticInfo};
+pub use arena::{Arena, ArenaEvent, ArenaSettings, Command, Reload, ReloadError, StaticInfo, Supplies};
 pub use arena_file::ArenaError;
 pub use controls::Controls;
 pub use kinds::{ActorKind, ActorKinds, Site};

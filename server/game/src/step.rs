@@ -86,8 +86,10 @@ pub struct LogicReport {
     pub messages: usize,
     /// Actors that came because another asked for them.
     pub added: usize,
-    /// Actors that went for the same reason, or because they were lost.
+    /// Actors that went for the same reason.
     pub removed: usize,
+    /// Actors that left the bounds, were quarantined, or could not go on: put back, or gone.
+    pub lost: usize,
     /// Effects.
     pub effects: usize,
     /// What was asked for and could not be had: an actor that the engine refused or that is one too many, a message to

@@ -5,29 +5,41 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use pita_sim::{Collider, Material, Settings, Shape, SimError, StaticDesc, World};
 
+use super::placing::Placed;
 use super::{Arena, ArenaSettings, StaticInfo};
-use crate::arena_file::{ActorFile, ArenaError, ArenaFile, DriverFile, Key, Materials};
-use crate::driver::{Driver, RouteDriver};
-use crate::kinds::{ActorKinds, Recipe, Site};
+use crate::arena_file::{ArenaError, ArenaFile, Key, Materials};
+use crate::kinds::{ActorKinds, Recipe};
 use crate::spawn::Pose;
 use crate::step::LogicReport;
-use crate::vehicle::{Identity, Vehicle};
+
+/// What an arena may need beside its text.
+#[derive(Clone, Copy)]
+pub struct Supplies<'a> {
+    /// The kinds of actors that it may place.
+    pub kinds: &'a ActorKinds,
+    /// Answers the bytes of a file in the arena's folder, by its path from there, or why there are none.
+    pub read: &'a dyn Fn(&str) -> Result<Vec<u8>, String>,
+}
 
 impl Arena {
-    /// Builds the arena that `text`, TOML, describes.
+    /// Builds the arena that `text`, TOML, describes, of what comes with the game; it cannot have meshes.
     ///
     /// # Errors
     /// Any [`ArenaError`]; it names the key, its value and what is allowed.
     pub fn from_toml(text: &str, settings: &ArenaSettings) -> Result<Self, ArenaError> {
-        Self::from_toml_with(text, settings, &ActorKinds::built_in())
+        let supplies =
+            Supplies { kinds: &ActorKinds::built_in(), read: &|_| Err("this arena has no folder".to_owned()) };
+        Self::from_toml_with(text, settings, &supplies)
     }
 
-    /// The same with the kinds of actors that `kinds` knows, a game's own among them.
+    /// The same with what `supplies` has: kinds of actors of a game's own, and files of the arena's folder.
     ///
     /// # Errors
     /// Any [`ArenaError`].
-    pub fn from_toml_with(text: &str, settings: &ArenaSettings, kinds: &ActorKinds) -> Result<Self, ArenaError> {
-        Self::from_file(&ArenaFile::parse(text)?, settings, kinds)
+    pub fn from_toml_with(text: &str, settings: &ArenaSettings, supplies: &Supplies) -> Result<Self, ArenaError> {
+        let mut file = ArenaFile::parse(text)?;
+        file.read_meshes(supplies.read)?;
+        Self::from_file(&file, settings, supplies.kinds)
     }
 
     pub(super) fn from_file(
@@ -35,13 +47,12 @@ impl Arena {
         settings: &ArenaSettings,
         kinds: &ActorKinds,
     ) -> Result<Self, ArenaError> {
-        let recipes = file.actors.iter().enumerate().map(|(i, actor)| kinds.recipe(i, actor, file));
-        let recipes = recipes.collect::<Result<Vec<_>, _>>()?;
+        let recipes = recipes(file, kinds)?;
         Key::new("tick_hz").count(settings.tick_hz.into(), 1, 1_000, "Hz")?;
         let dt = 1.0 / f64::from(settings.tick_hz);
         let gravity = DVec3::NEG_Y * file.gravity;
-        let solver = file.solver.settings();
-        let world = World::new(Settings { gravity, solver, threads: settings.threads, ..Settings::at(dt) })
+        let (solver, sleep, threads) = (file.solver.settings(), file.sleep.settings(), settings.threads);
+        let world = World::new(Settings { gravity, solver, sleep, threads, ..Settings::at(dt) })
             .map_err(refused(&Key::new("settings")))?;
         let mut arena = Self {
             name: file.name.clone(),
@@ -66,11 +77,12 @@ impl Arena {
             others: Vec::new(),
             requests: Vec::new(),
             logic: LogicReport::default(),
+            placed: Placed::default(),
+            reload: None,
         };
         arena.set_material_pairs(file)?;
         arena.add_statics(file)?;
-        arena.add_actors(file, &recipes)?;
-        arena.add_drivers(file)?;
+        arena.place_all(file, &recipes)?;
         // What was there from the start is in the description, it did not happen.
         arena.events.clear();
         Ok(arena)
@@ -87,42 +99,37 @@ impl Arena {
 
     fn add_statics(&mut self, file: &ArenaFile) -> Result<(), ArenaError> {
         for (i, piece) in file.statics.iter().enumerate() {
-            let shape = Shape::from(&piece.shape);
-            let (position, rotation) = (DVec3::from_array(piece.position), piece.angles().rotation());
+            let surface = || piece.surface.clone().map(Shape::Mesh);
+            let Some(shape) = piece.shape.as_ref().map(Shape::from).or_else(surface) else {
+                return Key::new("statics").index(i).require(false, "a mesh", "a shape: this arena has no folder");
+            };
             let collider = Collider::new(shape.clone(), material(&self.materials, &piece.material));
-            self.world
-                .add_static(StaticDesc { collider, position, rotation })
-                .map_err(refused(&Key::new("statics").index(i)))?;
-            self.statics.push(StaticInfo { shape, position, rotation });
-        }
-        Ok(())
-    }
-
-    /// Adds what `recipes` make of each of the file's actors.
-    fn add_actors(&mut self, file: &ArenaFile, recipes: &[Recipe]) -> Result<(), ArenaError> {
-        for (i, (actor, recipe)) in file.actors.iter().zip(recipes).enumerate() {
-            for pose in places(actor) {
-                let id = self.new_id();
-                let (world, materials, name) = (&mut self.world, &self.materials, actor.name());
-                let mut site = Site { world, id, name, pose, file, materials };
-                let added = recipe(&mut site).map_err(refused(&Key::new("actors").index(i)))?;
-                self.add(added);
+            let rotation = piece.angles().rotation();
+            for position in piece.block().places() {
+                let desc = StaticDesc { collider: collider.clone(), position, rotation };
+                self.world.add_static(desc).map_err(refused(&Key::new("statics").index(i)))?;
+                self.statics.push(StaticInfo { shape: shape.clone(), position, rotation });
             }
         }
         Ok(())
     }
 
-    fn add_drivers(&mut self, file: &ArenaFile) -> Result<(), ArenaError> {
-        for (i, driver) in file.drivers.iter().enumerate() {
-            let (route, pose) = start_of(file, driver);
-            let identity = Identity { id: self.new_id(), name: driver.name.clone(), slot: None };
-            let driver = Driver::Route(RouteDriver::new(route, driver.start + 1, driver.speed));
-            let vehicle = Vehicle::add(&mut self.world, identity, self.vehicle.clone(), driver, pose)
-                .map_err(refused(&Key::new("drivers").index(i)))?;
-            self.add(Box::new(vehicle));
+    fn place_all(&mut self, file: &ArenaFile, recipes: &[Recipe]) -> Result<(), ArenaError> {
+        for (i, recipe) in recipes.iter().enumerate() {
+            let ids = self.place_actors(file, i, recipe).map_err(refused(&Key::new("actors").index(i)))?;
+            self.placed.actors.push(ids);
+        }
+        for i in 0..file.drivers.len() {
+            let ids = self.place_driver(file, i).map_err(refused(&Key::new("drivers").index(i)))?;
+            self.placed.drivers.push(ids);
         }
         Ok(())
     }
+}
+
+/// What each of the file's actors is built by, all of them checked.
+pub(super) fn recipes(file: &ArenaFile, kinds: &ActorKinds) -> Result<Vec<Recipe>, ArenaError> {
+    file.actors.iter().enumerate().map(|(i, actor)| kinds.recipe(i, actor, file)).collect()
 }
 
 fn refused(key: &Key) -> impl FnOnce(SimError) -> ArenaError + use<> {
@@ -135,7 +142,7 @@ fn material(materials: &Materials, name: &str) -> Material {
     materials.get(name).copied().unwrap_or_default()
 }
 
-fn spawn_points(file: &ArenaFile) -> Vec<Pose> {
+pub(super) fn spawn_points(file: &ArenaFile) -> Vec<Pose> {
     let pose = |position, yaw: f64| Pose { position, yaw: yaw.to_radians() };
     let mut points: Vec<Pose> =
         file.spawns.iter().map(|spawn| pose(DVec3::from_array(spawn.position), spawn.yaw)).collect();
@@ -149,27 +156,4 @@ fn spawn_points(file: &ArenaFile) -> Vec<Pose> {
         }
     }
     points
-}
-
-/// Place of each copy, lowest layer first.
-fn places(actor: &ActorFile) -> impl Iterator<Item = Pose> {
-    let [nx, ny, nz] = actor.copies;
-    let first = DVec3::from_array(actor.position);
-    let spacing = DVec3::from_array(actor.spacing);
-    let yaw = actor.yaw.to_radians();
-    let cells = (0..ny).flat_map(move |iy| (0..nx).flat_map(move |ix| (0..nz).map(move |iz| [ix, iy, iz])));
-    cells.map(move |[ix, iy, iz]| {
-        let cell = DVec3::new(ix as f64, iy as f64, iz as f64);
-        Pose { position: first + cell * spacing, yaw }
-    })
-}
-
-/// Corners of a driver's route and his place at the first of them, facing the next. The route is checked to exist when
-/// the file is read.
-fn start_of(file: &ArenaFile, driver: &DriverFile) -> (Vec<[f64; 2]>, Pose) {
-    let corners = file.routes[&driver.route].corners.clone();
-    let [x, z] = corners[driver.start];
-    let [next_x, next_z] = corners[(driver.start + 1) % corners.len()];
-    let pose = Pose { position: DVec3::new(x, 0.0, z), yaw: f64::atan2(z - next_z, next_x - x) };
-    (corners, pose)
 }

@@ -4,11 +4,9 @@ use pita_sim::{DVec3, SimError, World};
 
 use super::{Arena, ArenaEvent};
 use crate::actor::{Actor, WhenLost};
+use crate::arena_file::ACTORS_MAX;
 use crate::spawn;
 use crate::step::{EFFECTS_MAX, LogicReport, Other, Request, Step};
-
-/// Most actors of an arena: what asks for more is refused.
-const ACTORS_MAX: usize = 16_384;
 
 impl Arena {
     /// Lets every actor judge its collisions, sees to those who are lost, lets every actor act, in order of id, and does
@@ -38,6 +36,7 @@ impl Arena {
 
     fn see_to_lost(&mut self) {
         let mut lost = std::mem::take(&mut self.lost);
+        self.logic.lost += lost.len();
         for id in lost.drain(..) {
             self.put_back(id);
         }
@@ -48,10 +47,7 @@ impl Arena {
     fn put_back(&mut self, id: u32) {
         let pose = match self.actors.get(&id).map(|actor| actor.when_lost()) {
             None => return,
-            Some(WhenLost::Remove) => {
-                self.logic.removed += 1;
-                return self.remove(id);
-            }
+            Some(WhenLost::Remove) => return self.remove(id),
             Some(WhenLost::Home(pose)) => pose,
             Some(WhenLost::Spawn) => spawn::choose(&self.spawns, &self.positions_but(id)),
         };

@@ -1,9 +1,11 @@
 //! The ranges of an arena file, and that its names refer to something.
 
-use super::{ArenaError, ArenaFile, Key, material};
+use super::{ArenaError, ArenaFile, Key, material, meshes};
 
-/// Most statics, spawn points and actors each, copies and grids counted.
+/// Most statics and spawn points each, copies and grids counted.
 const THINGS_MAX: usize = 4_096;
+/// Most actors of an arena, whoever adds them.
+pub const ACTORS_MAX: usize = 16_384;
 /// Most cars of the arena's own.
 const DRIVERS_MAX: usize = 256;
 /// Most corners of a route.
@@ -51,13 +53,22 @@ impl ArenaFile {
 
     fn check_statics(&self) -> Result<(), ArenaError> {
         let statics = Key::new("statics");
-        statics.count(self.statics.len(), 0, THINGS_MAX, "entries")?;
+        let mut pieces = 0;
         for (i, file) in self.statics.iter().enumerate() {
             let key = statics.index(i);
-            file.shape.check(&key.at("shape"))?;
+            match (&file.shape, &file.mesh) {
+                (Some(shape), None) => shape.check(&key.at("shape"))?,
+                (None, Some(name)) => meshes::check_name(&key.at("mesh"), name)?,
+                _ => key.require(false, "without a shape, or with two", "either shape or mesh")?,
+            }
             self.check_material(&key.at("material"), &file.material)?;
             key.at("position").vector(file.position, WORLD_MAX)?;
             file.angles().check(&key)?;
+            let block = file.block();
+            block.check(&key)?;
+            key.at("last copy").vector(block.last(), WORLD_MAX)?;
+            pieces += block.count();
+            key.at("copies").count(pieces, 1, THINGS_MAX, "statics in all")?;
         }
         Ok(())
     }
@@ -96,13 +107,11 @@ impl ArenaFile {
             check_text(&key.at("name"), file.name(), 32)?;
             self.check_inside(&key.at("position"), file.position)?;
             key.at("yaw").number(file.yaw, -360.0, 360.0, "deg")?;
-            for axis in 0..3 {
-                key.at("copies").index(axis).count(file.copies[axis], 1, THINGS_MAX, "copies")?;
-                key.at("spacing").index(axis).number(file.spacing[axis], -1_000.0, 1_000.0, "m")?;
-            }
-            self.check_inside(&key.at("last copy"), file.last())?;
-            actors += file.count();
-            key.at("copies").count(actors, 1, THINGS_MAX, "actors in all")?;
+            let block = file.block();
+            block.check(&key)?;
+            self.check_inside(&key.at("last copy"), block.last())?;
+            actors += block.count();
+            key.at("copies").count(actors, 1, ACTORS_MAX, "actors in all")?;
         }
         Ok(())
     }

@@ -1,11 +1,14 @@
 //! The tables of an arena file, as serde reads them: types and defaults, no ranges.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use glam::DVec3;
+use pita_sim::collide::TriangleMesh;
 use serde::Deserialize;
 
-use super::{Angles, MaterialFile, MaterialPairFile, ShapeFile, SolverFile};
+use super::block::Block;
+use super::{Angles, MaterialFile, MaterialPairFile, ParameterFile, ShapeFile, SleepFile, SolverFile};
 use crate::vehicle::VehicleParameters;
 
 /// A whole file.
@@ -24,6 +27,12 @@ pub struct ArenaFile {
     /// How the engine integrates.
     #[serde(default)]
     pub solver: SolverFile,
+    /// When what is still leaves the tick.
+    #[serde(default)]
+    pub sleep: SleepFile,
+    /// What who runs the arena may choose, by name.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, ParameterFile>,
     /// Box of the world.
     #[serde(default)]
     pub bounds: BoundsFile,
@@ -86,8 +95,13 @@ impl BoundsFile {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StaticFile {
-    /// Its shape.
-    pub shape: ShapeFile,
+    /// Its shape; either this or a mesh.
+    pub shape: Option<ShapeFile>,
+    /// Its surface of triangles: name of an OBJ or glTF file in the folder of the arena's file, or below.
+    pub mesh: Option<String>,
+    /// What [`ArenaFile::read_meshes`] read.
+    #[serde(skip)]
+    pub surface: Option<Arc<TriangleMesh>>,
     /// Name of its material.
     pub material: String,
     /// Its centre, m.
@@ -102,9 +116,20 @@ pub struct StaticFile {
     /// Deg.
     #[serde(default)]
     pub roll: f64,
+    /// How many along x, y and z.
+    #[serde(default = "one_of_each")]
+    pub copies: [usize; 3],
+    /// Distance of neighbours along x, y and z, m.
+    #[serde(default)]
+    pub spacing: [f64; 3],
 }
 
 impl StaticFile {
+    /// The block that it is one of, or all of.
+    pub fn block(&self) -> Block {
+        Block { first: self.position, copies: self.copies, spacing: self.spacing }
+    }
+
     /// Its angles.
     pub fn angles(&self) -> Angles {
         Angles { yaw: self.yaw, pitch: self.pitch, roll: self.roll }
@@ -167,14 +192,9 @@ impl ActorFile {
         self.name.as_deref().unwrap_or(&self.kind)
     }
 
-    /// How many there are.
-    pub fn count(&self) -> usize {
-        self.copies.iter().product()
-    }
-
-    /// Place of the last copy, m.
-    pub fn last(&self) -> [f64; 3] {
-        [0, 1, 2].map(|axis| self.position[axis] + (self.copies[axis] - 1) as f64 * self.spacing[axis])
+    /// The block that it is one of, or all of.
+    pub fn block(&self) -> Block {
+        Block { first: self.position, copies: self.copies, spacing: self.spacing }
     }
 }
 

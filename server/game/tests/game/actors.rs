@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use pita_game::arena_file::{ArenaError, ArenaFile, Key};
 use pita_game::assembly::{Assembly, Piece};
 use pita_game::{
-    Actor, ActorInfo, ActorKind, ActorKinds, Arena, ArenaEvent, Message, Pose, Site, Step, WhenLost, pipeline,
+    Actor, ActorInfo, ActorKind, ActorKinds, Arena, ArenaEvent, Message, Pose, Site, Step, Supplies, WhenLost, pipeline,
 };
 use pita_sim::{BodyId, DVec3, Shape, SimError, World};
 
@@ -269,7 +269,8 @@ impl Actor for Balloon {
 fn a_game_adds_kinds_of_its_own() {
     let kinds = ActorKinds::built_in().with::<Balloon>();
     let placed = |keys: &str| format!("{FLAT}\n[[actors]]\nkind = \"balloon\"\nposition = [0, 2, 0]\n{keys}\n");
-    let load = |text: &str| Arena::from_toml_with(text, &SETTINGS, &kinds);
+    let supplies = Supplies { kinds: &kinds, read: &|_| Err(String::new()) };
+    let load = |text: &str| Arena::from_toml_with(text, &SETTINGS, &supplies);
     let mut arena = load(&placed("lift = 12\nname = \"red\"\ncopies = [3, 1, 1]\nspacing = [2, 0, 0]")).unwrap();
     assert_eq!(
         arena.actors().map(|actor| (actor.kind, actor.name.as_str())).collect::<Vec<_>>(),

@@ -1,8 +1,9 @@
 //! Arena files, good and bad.
 
+use pita_game::arena_file::{ArenaFile, with_parameters};
 use pita_game::vehicle::VehicleParameters;
-use pita_game::{Arena, ArenaError};
-use pita_sim::{Method, SolverSettings};
+use pita_game::{ActorKinds, Arena, ArenaError, Supplies};
+use pita_sim::{Method, Shape, SolverSettings};
 
 use crate::test_track::{FLAT, SETTINGS};
 
@@ -30,6 +31,35 @@ fn arenas_choose_their_solver() {
     let solver = &arena.world().settings().solver;
     assert_eq!((solver.method, solver.sweeps, solver.budget), (Method::Sor, 9, Some(77)));
     assert_eq!(solver.relaxation, SolverSettings::default().relaxation);
+}
+
+#[test]
+fn arenas_choose_when_things_sleep() {
+    let with = |keys: &str| {
+        Arena::from_toml(&FLAT.replacen("[materials", &format!("[sleep]\n{keys}\n[materials"), 1), &SETTINGS)
+    };
+    let sleep = |keys: &str| with(keys).expect("a good file").world().settings().sleep.clone();
+    assert_eq!(sleep("time = 2").map(|sleep| (sleep.time, sleep.linear_speed)), Some((2.0, 0.01)));
+    assert_eq!(sleep("enabled = false"), None);
+    let Err(error) = with("time = -1") else { panic!("accepted") };
+    assert!(error.to_string().contains("sleep.time is -1"), "{error}");
+}
+
+#[test]
+fn parameters_are_chosen_by_who_runs_the_arena() {
+    let text = FLAT.replace("count = [8, 8]", "count = [\"$rows\", 2]");
+    let text = format!("{text}\n[parameters.rows]\ndefault = 3\nmin = 1\nmax = 5\n");
+    let load = |given: &[(&str, i64)]| {
+        let given = given.iter().map(|&(name, value)| (name.to_owned(), value)).collect();
+        with_parameters(&text, &given).and_then(|text| ArenaFile::parse(&text))
+    };
+    assert_eq!(load(&[]).unwrap().spawn_grids[0].count, [3, 2]);
+    assert_eq!(load(&[("rows", 5)]).unwrap().spawn_grids[0].count, [5, 2]);
+    let refusal = |given: &[(&str, i64)]| load(given).err().map(|error| error.to_string()).unwrap_or_default();
+    assert_eq!(refusal(&[("rows", 6)]), "parameters.rows is 6, allowed: 1 to 5");
+    assert_eq!(refusal(&[("lines", 2)]), "parameters is lines, allowed: one of rows");
+    let unknown = ArenaFile::parse(&text.replace("$rows", "$rovs")).err().map(|error| error.to_string());
+    assert!(unknown.is_some_and(|error| error.contains("invalid type: string \"$rovs\"")));
 }
 
 /// Replacement in the flat arena's file, and what the error has to say.
@@ -147,7 +177,7 @@ const BAD_ADDITIONS: &[(&str, &[&str])] = &[
     ),
     (
         "[[actors]]\nkind = \"prop\"\nshape.ball.radius = 1\nmaterial = \"asphalt\"\nmass = 1\nposition = [0, 0, 0]\ncopies = [4096, 4096, 4096]",
-        &["actors[0].copies is 68719476736", "1 to 4096 actors in all"],
+        &["actors[0].copies is 68719476736", "1 to 16384 actors in all"],
     ),
     ("[[actors]]\nkind = \"unicorn\"\nposition = [0, 0, 0]", &["actors[0].kind is unicorn", "one of", "prop"]),
     (
@@ -207,4 +237,34 @@ fn the_default_arena_explains_every_key_of_the_vehicle() {
         let explained = line.split_once('#').is_some_and(|(_, comment)| comment.contains(':'));
         assert!(explained, "{line} has no range");
     }
+}
+
+/// A mesh is read from beside the arena's file, carries what drives on it, and is refused by name.
+#[test]
+fn statics_may_be_meshes() {
+    let with = |mesh: &str| {
+        let piece = format!("[[statics]]\nmesh = \"{mesh}\"\nmaterial = \"asphalt\"\nposition = [0.0, 2.0, 0.0]\n");
+        FLAT.replacen("[[statics]]", &format!("{piece}[[statics]]"), 1)
+    };
+    let square = "v -9 0 -9\nv 9 0 -9\nv -9 0 9\nv 9 0 9\nf 1 3 4 2\n";
+    let read = |name: &str| match name {
+        "level/square.obj" => Ok(square.as_bytes().to_vec()),
+        _ => Err("no such file".to_owned()),
+    };
+    let supplies = Supplies { kinds: &ActorKinds::none(), read: &read };
+    let load = |mesh: &str| Arena::from_toml_with(&with(mesh), &SETTINGS, &supplies).map_err(|error| error.to_string());
+    let arena = load("level/square.obj").expect("a good file");
+    assert!(matches!(&arena.statics()[0].shape, Shape::Mesh(mesh) if mesh.triangles().len() == 2));
+    for (mesh, expected) in [
+        ("square.obj", "statics[0].mesh is square.obj, allowed: a readable file (no such file)"),
+        ("../square.obj", "statics[0].mesh is ../square.obj, allowed: a path below"),
+        ("/etc/passwd", "allowed: a path below"),
+        ("level//square.obj", "allowed: a path below"),
+    ] {
+        let error = load(mesh).err().unwrap_or_default();
+        assert!(error.contains(expected), "{error}, expected: {expected}");
+    }
+    assert!(refusal(&with("level/square.obj")).contains("this arena has no folder"));
+    let both = with("a.obj").replacen("mesh =", "shape.half_space = {}\nmesh =", 1);
+    assert!(refusal(&both).contains("either shape or mesh"), "{}", refusal(&both));
 }

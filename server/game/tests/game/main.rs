@@ -2,13 +2,17 @@
 
 mod actors;
 mod arena_files;
+mod arenas;
 mod collisions;
 mod driving;
+mod examples;
 mod free_form;
 mod handling;
 mod pipeline;
 mod players;
+mod props;
 mod rehearsals;
+mod reloads;
 mod reproducibility;
 mod sheep;
 mod stunts;

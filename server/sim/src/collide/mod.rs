@@ -5,12 +5,9 @@
 //! points. What comes out are contact points; [`potential::contact`](crate::potential) makes potentials of them.
 
 mod boxes;
-mod cloud;
 mod collision;
-mod compound;
 mod convex;
 mod core;
-mod embedded_hull;
 mod gjk;
 mod groups;
 mod half_space;
@@ -33,9 +30,6 @@ use std::collections::BTreeMap;
 use glam::{DQuat, DVec3};
 
 pub use collision::{Collision, CollisionId, CollisionObject, CollisionSide, Phase};
-pub use compound::{Compound, PIECES_MAX, Piece};
-pub use embedded_hull::EmbeddedHull;
-pub(crate) use embedded_hull::Foot;
 pub use groups::Groups;
 pub use material::{Material, MaterialId, Surface};
 pub use proximity::{At, Proximity, proximity};
@@ -106,8 +100,6 @@ pub(crate) struct Moving<'a> {
     pub collider: &'a Collider,
     pub pose: Pose,
     pub twist: Twist,
-    /// How much faster than its twist says its surface may be where it deforms, m/s.
-    pub spread: f64,
 }
 
 /// The second half of a pair: another body or a piece of static geometry.

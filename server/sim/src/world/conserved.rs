@@ -64,7 +64,8 @@ impl World {
         momentum
     }
 
-    fn point(&self, anchor: Anchor) -> DVec3 {
+    /// Where an anchor is, m.
+    pub(super) fn point(&self, anchor: Anchor) -> DVec3 {
         let body = anchor.body.and_then(|id| self.bodies.get(id));
         let at = PartPoint { part: anchor.part, point: anchor.point };
         body.map_or(anchor.point, |body| body.frame(at, &self.state).position.into())

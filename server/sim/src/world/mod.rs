@@ -4,6 +4,7 @@
 mod bodies;
 mod collisions;
 mod conserved;
+mod joint_loads;
 mod joints;
 mod potentials;
 mod queries;
@@ -22,6 +23,7 @@ use crate::sleep::Sleepers;
 use crate::state::State;
 
 pub use conserved::{Energy, Momentum};
+pub use joint_loads::JointId;
 pub use state::SliceView;
 
 /// Most times that a tick looks again for contacts where the solver put the bodies.

@@ -1,8 +1,10 @@
 //! Joints: gaps, loads, removal.
 
-use pita_sim::{Anchor, BallJointDesc, BodyId, DVec3, RigidBodyDesc, Shape, SpringDesc, World};
+use pita_sim::{
+    Anchor, BallJointDesc, BodyId, DQuat, DVec3, FixedJointDesc, JointId, RigidBodyDesc, Shape, SpringDesc, World,
+};
 
-use super::{particle, world};
+use super::{body, particle, world};
 
 /// Links from the world's origin along +x, joint to joint 0.25 m; answers the last one.
 pub fn chain(world: &mut World, links: usize, mass: f64, tolerance: f64) -> Vec<BodyId> {
@@ -72,4 +74,31 @@ fn removing_a_body_frees_what_hung_on_it() {
     let fallen = world.velocity(links[2]).unwrap().y - before;
     assert!((fallen + 9.81 / 30.0).abs() < 1e-9, "{fallen}");
     assert_eq!(world.report().islands, 1);
+}
+
+/// A lamp hangs from the ceiling by a ball joint, or is welded to it: the joint bears its weight, upwards on the lamp.
+#[test]
+fn joints_tell_what_they_bear() {
+    let mut world = world();
+    let above = DVec3::Y * 3.0;
+    let lamp = body(&mut world, Shape::Ball { radius: 0.2 }, 5.0, DVec3::Y * 2.0, 0.5);
+    let ends = (Anchor::world(above), Anchor::body(lamp, DVec3::Y));
+    let hung = JointId::Ball(world.add_ball_joint(BallJointDesc::new(ends.0, ends.1)).unwrap());
+    assert_eq!(world.joint_load(hung), Some((above, DVec3::ZERO)), "nothing yet");
+    let bears_weight = |world: &World, joint| {
+        let (at, force) = world.joint_load(joint).unwrap();
+        assert!(at == above && (force - DVec3::Y * 5.0 * 9.81).length() < 0.01 * 5.0 * 9.81, "{force} at {at}");
+    };
+    (0..30).for_each(|_| {
+        world.step();
+    });
+    bears_weight(&world, hung);
+    assert!(world.remove_joint(hung) && world.joint_load(hung).is_none() && !world.remove_joint(hung));
+    world.set_pose(lamp, DVec3::Y * 2.0, DQuat::IDENTITY).unwrap();
+    world.set_velocity(lamp, DVec3::ZERO, DVec3::ZERO).unwrap();
+    let welded = JointId::Fixed(world.add_fixed_joint(FixedJointDesc::new(ends.0, ends.1)).unwrap());
+    (0..30).for_each(|_| {
+        world.step();
+    });
+    bears_weight(&world, welded);
 }

@@ -1,0 +1,60 @@
+//! What the tables of a file place: actors, and the arena's own cars.
+
+use pita_sim::{DVec3, SimError};
+
+use super::Arena;
+use crate::actor::Actor;
+use crate::arena_file::{ArenaFile, DriverFile};
+use crate::driver::{Driver, RouteDriver};
+use crate::kinds::{Recipe, Site};
+use crate::spawn::Pose;
+use crate::vehicle::{Identity, Vehicle};
+
+/// Ids of what each table of the file placed.
+#[derive(Debug, Default)]
+pub(super) struct Placed {
+    pub actors: Vec<Vec<u32>>,
+    pub drivers: Vec<Vec<u32>>,
+}
+
+impl Arena {
+    /// Adds what `recipe` makes of the file's `index`-th actor and its copies; answers their ids.
+    pub(super) fn place_actors(
+        &mut self,
+        file: &ArenaFile,
+        index: usize,
+        recipe: &Recipe,
+    ) -> Result<Vec<u32>, SimError> {
+        let actor = &file.actors[index];
+        let place = |position| {
+            let (id, pose) = (self.new_id(), Pose { position, yaw: actor.yaw.to_radians() });
+            let (world, materials, name) = (&mut self.world, &self.materials, actor.name());
+            let added = recipe(&mut Site { world, id, name, pose, file, materials })?;
+            self.add(added);
+            Ok(id)
+        };
+        actor.block().places().map(place).collect()
+    }
+
+    /// Adds the file's `index`-th car; answers its id.
+    pub(super) fn place_driver(&mut self, file: &ArenaFile, index: usize) -> Result<Vec<u32>, SimError> {
+        let driver = &file.drivers[index];
+        let (route, pose) = start_of(file, driver);
+        let identity = Identity { id: self.new_id(), name: driver.name.clone(), slot: None };
+        let driver = Driver::Route(RouteDriver::new(route, driver.start + 1, driver.speed));
+        let vehicle = Vehicle::add(&mut self.world, identity, self.vehicle.clone(), driver, pose)?;
+        let id = vehicle.describe().id;
+        self.add(Box::new(vehicle));
+        Ok(vec![id])
+    }
+}
+
+/// Corners of a driver's route and his place at the first of them, facing the next. The route is checked to exist when
+/// the file is read.
+fn start_of(file: &ArenaFile, driver: &DriverFile) -> (Vec<[f64; 2]>, Pose) {
+    let corners = file.routes[&driver.route].corners.clone();
+    let [x, z] = corners[driver.start];
+    let [next_x, next_z] = corners[(driver.start + 1) % corners.len()];
+    let pose = Pose { position: DVec3::new(x, 0.0, z), yaw: f64::atan2(z - next_z, next_x - x) };
+    (corners, pose)
+}

@@ -1,0 +1,49 @@
+//! Meshes of an arena: files beside its own, read through the caller.
+
+use std::sync::Arc;
+
+use pita_sim::geometry::Geometry;
+
+use super::{ArenaError, ArenaFile, Key};
+
+/// Most triangles of an arena: the description that clients join with has a hull for each, and 2 MiB for all.
+const TRIANGLES_MAX: usize = 16_384;
+
+/// Longest name of a file, bytes.
+const NAME_MAX: usize = 128;
+
+impl ArenaFile {
+    /// Reads the meshes of statics. `read` answers the bytes of a file in the folder of the arena's file, or why not.
+    ///
+    /// # Errors
+    /// [`ArenaError`] naming the static, the file and what is wrong with it.
+    pub fn read_meshes(&mut self, read: impl Fn(&str) -> Result<Vec<u8>, String>) -> Result<(), ArenaError> {
+        let mut triangles = 0;
+        for (i, piece) in self.statics.iter_mut().enumerate() {
+            let Some(name) = &piece.mesh else { continue };
+            let key = Key::new("statics").index(i).at("mesh");
+            let bytes = match read(name) {
+                Ok(bytes) => bytes,
+                Err(reason) => return key.require(false, name, &format!("a readable file ({reason})")),
+            };
+            let surface = Geometry::from_file(name, &bytes).and_then(|geometry| geometry.surface());
+            let surface = surface.map_err(|source| ArenaError::Engine { key: format!("{key}, {name}"), source })?;
+            triangles += surface.triangles().len();
+            key.count(triangles, 1, TRIANGLES_MAX, "triangles, those of earlier meshes included")?;
+            piece.surface = Some(Arc::new(surface));
+        }
+        Ok(())
+    }
+}
+
+/// `Err` unless `name` leads to nowhere but the arena's folder and those below it.
+pub(super) fn check_name(key: &Key, name: &str) -> Result<(), ArenaError> {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || "-_./".contains(c);
+    let inside = name.split('/').all(|part| !part.is_empty() && !part.starts_with('.'));
+    let fits = name.len() <= NAME_MAX && name.chars().all(allowed) && inside;
+    key.require(
+        fits,
+        name,
+        "a path below the arena's folder: 1 to 128 of a-z A-Z 0-9 - _ . /, no part begins with a dot",
+    )
+}

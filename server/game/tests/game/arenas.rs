@@ -1,0 +1,56 @@
+//! The arenas that ship live by themselves: nothing leaves them, nothing bursts, and the same run gives the same bits.
+
+use pita_game::{Arena, ArenaSettings, arena_file, pipeline};
+
+use crate::test_track::{Recorder, SETTINGS};
+
+/// Every arena that the server has built in, and the flat one of the tests.
+const ARENAS: [(&str, &str); 5] = [
+    ("proving-ground", Arena::DEFAULT),
+    ("desert-town", include_str!("../../../../configs/arenas/desert-town.toml")),
+    ("sheep-pasture", include_str!("../../../../configs/arenas/sheep-pasture.toml")),
+    ("stress", include_str!("../../../../configs/arenas/stress.toml")),
+    ("flat", include_str!("../../../../configs/arenas/flat.toml")),
+];
+
+/// Nothing in an arena moves faster, m/s: the tornado throws cars at up to 25, and what they hit flies off at twice that.
+const FASTEST: f64 = 60.0;
+
+/// Runs an arena for `seconds` and answers its state hash.
+fn run(name: &str, text: &str, seconds: usize, settings: &ArenaSettings) -> u64 {
+    let mut arena = Arena::from_toml(text, settings).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let mut ports = Recorder::default();
+    for tick in 0..seconds * usize::from(settings.tick_hz) {
+        pipeline::tick(&mut arena, &mut ports);
+        ports = Recorder::default();
+        let world = arena.world();
+        assert_eq!(world.report().quarantined, 0, "{name}, tick {tick}");
+        for actor in arena.actors() {
+            let bodies = arena.actor(actor.id).expect("listed above").bodies();
+            let fastest =
+                bodies.iter().filter_map(|&body| world.velocity(body)).map(|v| v.length()).fold(0.0, f64::max);
+            assert!(fastest < FASTEST, "{name}, tick {tick}: {} {} at {fastest} m/s", actor.kind, actor.id);
+        }
+        assert_eq!(arena.logic().lost, 0, "{name}, tick {tick}: something left the arena");
+    }
+    arena.world().state_hash()
+}
+
+#[test]
+fn shipped_arenas_live_by_themselves() {
+    for (name, text) in ARENAS {
+        let first = run(name, text, 20, &SETTINGS);
+        assert_eq!(first, run(name, text, 20, &ArenaSettings { threads: 2, ..SETTINGS }), "{name}, with two threads");
+    }
+}
+
+#[test]
+fn the_stress_arena_is_as_large_as_it_is_asked_to_be() {
+    let (_, text) = ARENAS[3];
+    for (size, bodies) in [(1, 9), (10, 540), (48, 11_712)] {
+        let text = arena_file::with_parameters(text, &[("size".to_owned(), size)].into()).unwrap();
+        let arena = Arena::from_toml(&text, &SETTINGS).unwrap_or_else(|error| panic!("{error}"));
+        let cars = 2 * 5;
+        assert_eq!(arena.world().body_count(), bodies + cars, "of size {size}");
+    }
+}

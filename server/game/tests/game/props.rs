@@ -1,0 +1,134 @@
+//! Props: they stand, give way, break, tip, open and wobble.
+
+use pita_game::{Arena, ArenaEvent, Controls};
+use pita_sim::{BodyId, DVec3, PartPoint};
+
+use crate::test_track::{FLAT, FULL_THROTTLE, SETTINGS, TestTrack};
+
+/// Flat ground with an actor of `kind`, and one place for a car, at the origin.
+fn with(kind: &str, keys: &str) -> TestTrack {
+    let ground =
+        FLAT.replace("[[spawn_grids]]\ncount = [8, 8]\nspacing = [8.0, 6.0]", "[[spawns]]\nposition = [0, 0, 0]");
+    TestTrack::new(&format!("{ground}\n[[actors]]\nkind = \"{kind}\"\nmaterial = \"asphalt\"\n{keys}\n"), SETTINGS)
+}
+
+fn run(track: &mut TestTrack, seconds: f64) {
+    for _ in 0..(30.0 * seconds) as usize {
+        track.tick();
+    }
+}
+
+fn bodies(arena: &Arena, kind: &str) -> Vec<BodyId> {
+    let id = arena.actors().find(|actor| actor.kind == kind).expect("there is one").id;
+    arena.actor(id).expect("described above").bodies().to_vec()
+}
+
+#[test]
+fn crates_and_barrels_stand_on_their_places_and_fall_asleep() {
+    for kind in ["crate", "barrel"] {
+        let mut track = with(kind, "position = [30, 0, 40]\ncopies = [2, 1, 2]\nspacing = [3, 0, 3]");
+        let before: Vec<_> = track.arena.world().bodies().iter().map(|&id| track.arena.world().position(id)).collect();
+        run(&mut track, 3.0);
+        let world = track.arena.world();
+        assert_eq!(world.body_count(), 4);
+        for (&id, before) in world.bodies().iter().zip(before) {
+            let moved = world.position(id).unwrap() - before.unwrap();
+            assert!(moved.length() < 2e-3 && world.is_asleep(id), "a {kind} moved {moved}");
+        }
+    }
+}
+
+/// A fence stands for itself and against a push; a car goes through it, and it is whole again when it is placed anew.
+#[test]
+fn fences_break_at_a_force() {
+    let mut track = with("fence", "position = [30, 0, -6]\nyaw = -90\nboards = 6");
+    let boards = bodies(&track.arena, "fence");
+    run(&mut track, 3.0);
+    let world = track.arena.world();
+    assert!(boards.iter().all(|&board| world.is_asleep(board)), "an untouched fence is still");
+    let upright = |track: &TestTrack, board: BodyId| (track.arena.world().rotation(board).unwrap() * DVec3::Y).y > 0.99;
+    assert!(boards.iter().all(|&board| upright(&track, board)));
+    track.enter(0);
+    track.tick();
+    let mut splinters = 0;
+    for _ in 0..30 * 8 {
+        track.drive(0, FULL_THROTTLE);
+        track.tick();
+        let is_splinters = |event: &&ArenaEvent| matches!(event, ArenaEvent::Effect(e) if e.kind == "splinters");
+        splinters += track.arena.events().iter().filter(is_splinters).count();
+    }
+    assert!(track.car(0).position.x > 40.0, "the car is through: {:?}", track.car(0));
+    assert!(splinters >= 2, "{splinters} joints broke");
+    assert!(boards.iter().any(|&board| !upright(&track, board)), "boards lie about");
+    assert_eq!(track.arena.world().report().quarantined, 0);
+}
+
+#[test]
+fn a_strong_fence_holds_a_car() {
+    let mut track = with("fence", "position = [12, 0, -6]\nyaw = -90\nboards = 6\nstrength = 1e9\nmass = 500");
+    track.enter(0);
+    track.tick();
+    track.run(4.0, Controls { throttle: 0.3, ..FULL_THROTTLE });
+    let car = track.car(0).position;
+    assert!(car.x > 8.0 && car.x < 12.0, "{car}");
+}
+
+#[test]
+fn a_seesaw_tips_under_a_load() {
+    let mut track = with(
+        "seesaw",
+        "position = [30, 0, 40]\n[[actors]]\nkind = \"crate\"\nmaterial = \"asphalt\"\nmass = 200\nposition = [33, 1.5, 40]",
+    );
+    let plank = bodies(&track.arena, "seesaw")[0];
+    run(&mut track, 3.0);
+    let along = track.arena.world().rotation(plank).unwrap() * DVec3::X;
+    assert!(along.y < -0.15, "the loaded end is down: {along}");
+    let middle = track.arena.world().position(plank).unwrap();
+    assert!(middle.distance(DVec3::new(30.0, 0.8, 40.0)) < 5e-3, "{middle}");
+}
+
+#[test]
+fn a_drawbridge_opens_and_closes_by_the_clock() {
+    let mut track = with(
+        "drawbridge",
+        "position = [30, 0.5, 40]\nsize = [6, 0.3, 4]\nopens_deg = 60\nspeed_deg = 30\ndown_and_up = [4, 4]",
+    );
+    let leaf = bodies(&track.arena, "drawbridge")[0];
+    let angle = |track: &TestTrack| {
+        let along = track.arena.world().rotation(leaf).unwrap() * DVec3::X;
+        along.y.asin().to_degrees()
+    };
+    run(&mut track, 3.5);
+    assert!(angle(&track).abs() < 0.5, "down: {}", angle(&track));
+    run(&mut track, 4.0);
+    assert!((angle(&track) - 60.0).abs() < 0.5, "up: {}", angle(&track));
+    run(&mut track, 4.0);
+    assert!(angle(&track).abs() < 0.5, "down again: {}", angle(&track));
+}
+
+/// It sags a little, carries a crate, and keeps its volume.
+#[test]
+fn a_jelly_wobbles_and_springs_back() {
+    let mut track = with(
+        "jelly",
+        "position = [30, 0.5, 40]\n[[actors]]\nkind = \"crate\"\nmaterial = \"asphalt\"\nmass = 30\nposition = [30, 3, 40]",
+    );
+    let jelly = bodies(&track.arena, "jelly")[0];
+    let height = |track: &TestTrack| {
+        let q = track.arena.world().slice(jelly).unwrap().q.to_vec();
+        let y = q.iter().skip(1).step_by(3);
+        y.clone().fold(f64::NEG_INFINITY, |a, &b| a.max(b)) - y.fold(f64::INFINITY, |a, &b| a.min(b))
+    };
+    let mut least = f64::INFINITY;
+    for _ in 0..30 * 6 {
+        track.tick();
+        least = least.min(height(&track));
+    }
+    let world = track.arena.world();
+    assert!(least < 1.45 && least > 0.7, "it gives way: {least}");
+    assert!(height(&track) > 1.3, "and comes back: {}", height(&track));
+    let crate_ = world.position(bodies(&track.arena, "crate")[0]).unwrap();
+    assert!(crate_.y > 1.4, "it carries the crate: {crate_}");
+    assert!(world.frame(jelly, PartPoint { part: 0, point: DVec3::Y }).is_some());
+    assert_eq!(world.report().quarantined, 0);
+}
