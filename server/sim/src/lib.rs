@@ -34,8 +34,8 @@ mod state;
 mod world;
 
 pub use collide::{
-    Collider, Collision, CollisionId, CollisionObject, CollisionSide, ContactView, Groups, Material, MaterialId,
-    Nearest, Phase, QueryFilter, RayHit, Shape, StaticDesc, StaticId, Surface,
+    Collider, Collision, CollisionId, CollisionObject, CollisionSide, Compound, ContactView, EmbeddedHull, Groups,
+    Material, MaterialId, Nearest, Phase, Piece, QueryFilter, RayHit, Shape, StaticDesc, StaticId, Surface,
 };
 pub use dof::articulated::{
     Articulated, JointDesc, JointDrive, JointKind, JointLimit, JointMotor, JointSpring, LimitRange, PartDesc,

@@ -7,11 +7,13 @@ use glam::DVec3;
 const ELBOW_ROOM: f64 = 2.2;
 /// It stays with those that it sees within this, m.
 const SIGHT: f64 = 15.0;
-/// Farther than this from their middle it goes there, m.
-const LONELY: f64 = 6.0;
+/// Farther than this from the middle of `n` of them it goes there, m: they cover as much ground as they need.
+fn lonely(n: f64) -> f64 {
+    3.0 + 1.5 * n.sqrt()
+}
 /// Most that it goes along with the others for no reason of its own; less than what is worth a walk, or a flock that walks
 /// would walk for ever.
-const DRIFT: f64 = 0.2;
+const DRIFT: f64 = 0.15;
 /// It sees where what it fears will be in this time, s.
 const FORESIGHT: f64 = 0.6;
 
@@ -57,14 +59,14 @@ pub fn with_flock(me: DVec3, mates: impl Iterator<Item = Mate>) -> DVec3 {
         return DVec3::ZERO;
     }
     let home = (middle / seen - me).with_y(0.0);
-    let together = if home.length() > LONELY { home.normalize() * 0.5 } else { DVec3::ZERO };
+    let together = if home.length() > lonely(seen) { home.normalize() * 0.5 } else { DVec3::ZERO };
     2.0 * apart + together + (drift / seen).clamp_length_max(DRIFT)
 }
 
 /// Which way threats drive it: zero where nothing frightens it, longer the closer they are.
 pub fn away_from(me: DVec3, threats: impl Iterator<Item = Threat>) -> DVec3 {
     let mut away = DVec3::ZERO;
-    for threat in threats {
+    for threat in threats.filter(|threat| threat.radius > 0.0) {
         let (now, then) = (threat.position, threat.position + threat.velocity * FORESIGHT);
         let nearest = if then.distance_squared(me) < now.distance_squared(me) { then } else { now };
         let apart = (me - nearest).with_y(0.0);

@@ -4,11 +4,13 @@ use glam::{DQuat, DVec3};
 
 use super::SheepParameters;
 
-/// It has decided what to do for this long at least, and at most, s.
-const PATIENCE: [f64; 2] = [2.0, 7.0];
+/// It grazes in one place for this long at least, and at most, s,
+const GRAZES: [f64; 2] = [4.0, 14.0];
+/// and walks about for so long.
+const WALKS: [f64; 2] = [1.5, 4.0];
 
 /// A wish of the flock shorter than this is not worth a walk.
-const WORTH_A_WALK: f64 = 0.3;
+const WORTH_A_WALK: f64 = 0.45;
 
 /// Numbers that look random: SplitMix64 (Steele, Lea and Flood, 2014) of a seed and a counter, so that the same sheep in
 /// the same run throws the same.
@@ -66,7 +68,7 @@ impl Mind {
     /// A mind that grazes; another seed makes another sheep of it.
     pub fn new(seed: u64) -> Self {
         let mut dice = Dice { state: seed };
-        let patience = PATIENCE[1] * dice.throw();
+        let patience = GRAZES[1] * dice.throw();
         Self { dice, mood: Mood::Grazing, wish: DVec3::ZERO, patience }
     }
 
@@ -103,16 +105,15 @@ impl Mind {
 
     /// Who walked or ran grazes, who grazed walks somewhere as often as not.
     fn change(&mut self) {
-        let [least, most] = PATIENCE;
-        self.patience = least + (most - least) * self.dice.throw();
         let wanders = self.mood == Mood::Grazing && self.dice.throw() < 0.5;
-        let (mood, wish) = if wanders {
+        let [least, most] = if wanders { WALKS } else { GRAZES };
+        self.patience = least + (most - least) * self.dice.throw();
+        if wanders {
             let yaw = std::f64::consts::TAU * self.dice.throw();
-            (Mood::Walking, DQuat::from_rotation_y(yaw) * DVec3::X)
+            self.go(Mood::Walking, DQuat::from_rotation_y(yaw) * DVec3::X);
         } else {
-            (Mood::Grazing, DVec3::ZERO)
-        };
-        self.go(mood, wish);
+            self.go(Mood::Grazing, DVec3::ZERO);
+        }
     }
 }
 
@@ -147,6 +148,6 @@ mod tests {
             mind.think(&p, &calm, 0.5);
             moods[usize::from(mind.mood() == Mood::Walking)] += 1;
         }
-        assert!(moods.iter().all(|&ticks| ticks > 300), "{moods:?}");
+        assert!(moods[0] > moods[1] && moods[1] > 100, "{moods:?}");
     }
 }

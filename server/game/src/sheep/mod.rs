@@ -29,6 +29,8 @@ use rig::Rig;
 
 /// It thinks every so many ticks.
 const THINK_PERIOD: u32 = 10;
+/// What kind of actor a car is.
+const CAR: &str = "vehicle";
 /// Slower than this a car frightens nobody, m/s.
 const HARMLESS_SPEED: f64 = 1.5;
 /// So long without ground under it, and it goes limp, s.
@@ -212,11 +214,7 @@ impl Sheep {
 /// What a sheep fears.
 fn threat(other: &Other, radius: f64) -> Option<Threat> {
     let &Other { position, velocity, kind, .. } = other;
-    if radius <= 0.0 {
-        return None;
-    }
-    let is_car = kind == "vehicle" && velocity.length() > HARMLESS_SPEED;
-    let radius = if kind == Tornado::KIND { 1.5 * radius } else { radius };
+    let is_car = kind == CAR && velocity.length() > HARMLESS_SPEED;
     (is_car || kind == Tornado::KIND).then_some(Threat { position, velocity, radius })
 }
 

@@ -17,7 +17,7 @@ pub struct SheepParameters {
     pub walk_speed: f64,
     /// m/s.
     pub flee_speed: f64,
-    /// It flees what moves and is closer, and tornadoes from half as far again, m.
+    /// It flees moving cars and tornadoes that are closer, m.
     pub fear_radius: f64,
     /// It walks back when it is farther from its place, m.
     pub pasture_radius: f64,

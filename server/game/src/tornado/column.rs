@@ -33,7 +33,8 @@ impl Column {
         let spacing = p.height / (Self::SPHERES - 1) as f64;
         let shapes: [Shape; Self::SPHERES] = std::array::from_fn(|i| {
             let share = i as f64 / (Self::SPHERES - 1) as f64;
-            Shape::Ball { radius: p.foot_radius + (p.top_radius - p.foot_radius) * share }
+            let orbit = p.foot_radius + (p.top_radius - p.foot_radius) * share;
+            Shape::Ball { radius: if i == 0 { p.reach } else { orbit } }
         });
         let mut add_sphere = |i: usize| {
             let collider = Some(Collider::new(shapes[i].clone(), 0.0).into_sensor());

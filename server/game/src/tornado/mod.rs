@@ -169,7 +169,9 @@ impl Actor for Tornado {
     fn collide(&mut self, contact: &Contact) -> Response {
         let is_ground = matches!(contact.partner, Partner::Ground(_));
         if is_ground && contact.own.body == Some(self.column.foot()) {
-            self.touches_ground = contact.phase != Phase::End;
+            // Its sphere reaches farther than the foot itself.
+            let p = &self.parameters;
+            self.touches_ground = contact.phase != Phase::End && contact.gap <= p.foot_radius - p.reach;
         }
         if let Some(body) = contact.other.body.filter(|_| self.is_valid_victim(contact)) {
             let is_news = !self.seen.contains(&body) && self.seen.len() < self.seen.capacity();

@@ -15,10 +15,12 @@ const LEGS_MAX: usize = 256;
 pub struct TornadoParameters {
     /// From foot to top, m.
     pub height: f64,
-    /// Of the orbit at the foot, and of the sphere that sees victims there, m.
+    /// Of the orbit at the foot, m.
     pub foot_radius: f64,
-    /// The same at the top, m.
+    /// Of the orbit at the top, and of the sphere that sees victims there, m.
     pub top_radius: f64,
+    /// How far from the foot it sees victims and draws them in, m.
+    pub reach: f64,
     /// At which its waist and top follow what is below them, Hz.
     pub sway_frequency: f64,
     /// Of that; 1 is critical.
@@ -122,6 +124,7 @@ impl Default for TornadoParameters {
             height: 14.0,
             foot_radius: 3.0,
             top_radius: 6.0,
+            reach: 7.0,
             sway_frequency: 0.5,
             sway_damping: 0.7,
             path_acceleration: 15.0,
@@ -163,6 +166,7 @@ impl TornadoParameters {
         number("height", self.height, 2.0, 200.0, "m")?;
         number("foot_radius", self.foot_radius, 0.5, 50.0, "m")?;
         number("top_radius", self.top_radius, 0.5, 50.0, "m")?;
+        number("reach", self.reach, self.foot_radius, 100.0, "m, and not less than foot_radius")?;
         number("sway_frequency", self.sway_frequency, 0.05, 2.0, "Hz")?;
         number("sway_damping", self.sway_damping, 0.3, 2.0, "")?;
         number("path_acceleration", self.path_acceleration, 0.1, 200.0, "m/s^2")?;

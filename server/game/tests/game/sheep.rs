@@ -1,6 +1,6 @@
 //! Sheep: a flock walks, flees a car, is thrown about, gets up again, and stays where it belongs; in all three forms.
 
-use pita_game::{ActorInfo, Controls};
+use pita_game::{ActorInfo, ArenaSettings, Controls};
 use pita_sim::{DVec3, PartPoint};
 
 use crate::test_track::{FLAT, SETTINGS, TestTrack};
@@ -77,7 +77,6 @@ fn a_flock_grazes_and_walks_on_its_feet() {
                 farthest = farthest.max(at.distance(start[i].0));
             }
         }
-        println!("{form}: {iterations} iterations, asleep {asleep}, {farthest:.1} m");
         assert!((1.0..25.0).contains(&farthest), "{form}: {farthest} m");
         assert!(asleep > 30, "{form}: {asleep} of 270 sheep seconds asleep");
         // Nine sheep for nine hundred ticks.
@@ -125,11 +124,30 @@ fn sheep_are_thrown_about_and_get_up() {
             }
         }
         let end = stand(&track);
-        println!("{form}: highest {highest:.1?}, fell {fell:?}, {end:.2?}");
         assert!(highest.iter().any(|&height| height > 5.0), "{form}: {highest:?}");
         assert!(fell.contains(&true), "{form}: {fell:?}");
         for (i, (at, upright)) in end.into_iter().enumerate() {
             assert!(upright > 0.9 && (at.y - 0.79).abs() < 0.1, "{form}, sheep {i}: {upright} at {at}");
         }
     }
+}
+
+/// The same sheep do the same, whatever the number of threads.
+#[test]
+fn sheep_repeat_themselves() {
+    let hashes = |threads: usize| {
+        let tornado = "[[actors]]\nkind = \"tornado\"\nposition = [15.0, 0.0, 31.0]\n\
+                       legs = [{ to = [50.0, 0.0, 31.0], frequency = 0.2 }]\n";
+        let text = format!("{FLAT}{WOOL}{}{tornado}", flock(2, [30.0, 30.0], "seed = 7"));
+        let mut track = TestTrack::new(&text, ArenaSettings { threads, ..SETTINGS });
+        let mut hashes = Vec::new();
+        for _ in 0..10 {
+            run(&mut track, 1.0);
+            hashes.push(track.arena.world().state_hash());
+        }
+        hashes
+    };
+    let first = hashes(1);
+    assert_eq!(first, hashes(2));
+    assert!(first.windows(2).all(|pair| pair[0] != pair[1]), "nothing moves");
 }

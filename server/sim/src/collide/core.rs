@@ -7,6 +7,8 @@ use parry3d_f64::shape::{
     ConvexPolyhedron, Cuboid, Cylinder, PackedFeatureId, PolygonalFeature, PolygonalFeatureMap, Segment, SupportMap,
 };
 
+use super::cloud::Cloud;
+
 /// Most corners of a face that a manifold is made of.
 const FACE_CORNERS_MAX: usize = 4;
 
@@ -18,6 +20,7 @@ pub(super) enum Core {
     Box(Cuboid),
     Cylinder(Cylinder),
     Polytope(Polytope),
+    Cloud(Cloud),
 }
 
 impl Core {
@@ -28,6 +31,7 @@ impl Core {
             Self::Box(cuboid) => cuboid,
             Self::Cylinder(cylinder) => cylinder,
             Self::Polytope(polytope) => polytope,
+            Self::Cloud(cloud) => cloud,
         }
     }
 

@@ -3,6 +3,7 @@
 use glam::DMat3;
 use slotmap::SlotMap;
 
+use super::embedded_hull::{Deformed, Motion};
 use super::kdop::Kdop;
 use super::shape::{Collider, Shape};
 use super::{Bound, Moving};
@@ -18,36 +19,46 @@ pub(crate) struct Bodies<'a> {
 }
 
 impl<'a> Bodies<'a> {
-    /// What a body collides with there.
+    /// What a body collides with there; of an embedded hull, without its shape.
     pub fn collider(self, placed: &Placed) -> Option<&'a Collider> {
-        let body = self.bodies.get(placed.body)?;
+        let (body, index) = (self.bodies.get(placed.body)?, placed.index as usize);
         match &body.figure {
-            Some(figure) => Some(&figure.colliders[placed.index as usize].collider),
-            None => body.collider.as_ref(),
+            None => body.colliders.get(index),
+            Some(figure) => match figure.hull(placed.index) {
+                Some(hull) => Some(hull.collider()),
+                None => Some(&figure.colliders.get(index)?.collider),
+            },
         }
     }
 
-    /// Where a collider is and how it moves; `None` where its body takes no part.
-    pub fn motion(self, placed: &Placed) -> Option<(Pose, Twist)> {
-        let body = self.bodies.get(placed.body).filter(|body| !body.quarantined)?;
-        let Some(figure) = &body.figure else { return Some((body.pose(self.state), body.twist(self.state))) };
-        let frame = figure.dof.frame(placed.at, self.state.q(body.slice), self.state.v(body.slice));
-        Some((frame.pose(), frame.twist()))
+    /// Where a collider is and how it moves.
+    fn motion(self, placed: &Placed, body: &Body) -> (Pose, Twist) {
+        match &body.figure {
+            None => placed.carried(body.pose(self.state), body.twist(self.state)),
+            Some(figure) => {
+                let frame = figure.dof.frame(placed.at, self.state.q(body.slice), self.state.v(body.slice));
+                (frame.pose(), frame.twist())
+            }
+        }
     }
 }
 
 /// A collider of a body.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Hull {
     pub placed: Placed,
     /// Serial of the body.
     pub owner: u32,
     pose: Pose,
     twist: Twist,
+    /// How much faster than its twist says its surface may be, m/s.
+    spread: f64,
     /// Of the hull and of all that a tick may do to it; empty where the body takes no part.
     pub bounds: Bound,
     /// How the tick moves it, as far as the second look asks.
     pub stride: Stride,
+    /// What it is in this tick where its vertices are embedded.
+    deformed: Option<Box<Deformed>>,
 }
 
 /// Whether a tick moves a hull far.
@@ -61,23 +72,25 @@ pub(super) struct Stride {
 
 impl Hull {
     pub fn new(placed: Placed, owner: u32) -> Self {
-        Self {
-            placed,
-            owner,
-            pose: Pose::IDENTITY,
-            twist: Twist::REST,
-            bounds: Bound::EMPTY,
-            stride: Stride::default(),
-        }
+        let (pose, twist, spread, bounds) = (Pose::IDENTITY, Twist::REST, 0.0, Bound::EMPTY);
+        Self { placed, owner, pose, twist, spread, bounds, stride: Stride::default(), deformed: None }
     }
 
     /// Takes over where its body is now.
     pub fn follow(&mut self, bodies: Bodies, settings: &Settings) {
-        let motion = bodies.motion(&self.placed);
         self.bounds = Bound::EMPTY;
-        if let (Some((pose, twist)), Some(collider)) = (motion, bodies.collider(&self.placed)) {
-            (self.pose, self.twist) = (pose, twist);
-            self.bounds = swept_bounds(collider, pose, twist, settings);
+        let Some(body) = bodies.bodies.get(self.placed.body).filter(|body| !body.quarantined) else { return };
+        match body.figure.as_ref().and_then(|figure| Some((figure, figure.hull(self.placed.index)?))) {
+            None => (self.pose, self.twist) = bodies.motion(&self.placed, body),
+            Some((figure, hull)) => {
+                let deformed = self.deformed.get_or_insert_with(|| Box::new(Deformed::new(hull)));
+                let state = [bodies.state.q(body.slice), bodies.state.v(body.slice)];
+                Motion { pose: self.pose, twist: self.twist, spread: self.spread } =
+                    deformed.follow(hull, figure, state);
+            }
+        }
+        if let Some(collider) = self.collider(bodies) {
+            self.bounds = swept_bounds(&self.seen(collider), settings);
         }
     }
 
@@ -86,11 +99,22 @@ impl Hull {
         (self.bounds != Bound::EMPTY).then_some(self.pose)
     }
 
+    /// What it collides with, where it is.
+    pub fn collider<'a>(&'a self, bodies: Bodies<'a>) -> Option<&'a Collider> {
+        match &self.deformed {
+            Some(deformed) => Some(&deformed.collider),
+            None => bodies.collider(&self.placed),
+        }
+    }
+
     /// What the fine phase sees of it.
-    pub fn moving<'a>(&self, bodies: Bodies<'a>) -> Option<Moving<'a>> {
-        let collider = bodies.collider(&self.placed)?;
-        let Self { placed: Placed { serial, .. }, owner, pose, twist, .. } = *self;
-        Some(Moving { serial, owner, collider, pose, twist })
+    pub fn moving<'a>(&'a self, bodies: Bodies<'a>) -> Option<Moving<'a>> {
+        Some(self.seen(self.collider(bodies)?))
+    }
+
+    fn seen<'a>(&self, collider: &'a Collider) -> Moving<'a> {
+        let Self { placed: Placed { serial, .. }, owner, pose, twist, spread, .. } = *self;
+        Moving { serial, owner, collider, pose, twist, spread }
     }
 }
 
@@ -104,11 +128,12 @@ pub(super) fn bounds(shape: &Shape, pose: Pose) -> Bound {
 }
 
 /// Bounds of a collider and of all that a tick may do to it.
-fn swept_bounds(collider: &Collider, pose: Pose, twist: Twist, settings: &Settings) -> Bound {
+fn swept_bounds(hull: &Moving, settings: &Settings) -> Bound {
+    let Moving { collider, pose, twist, spread, .. } = *hull;
     let (to_shape, radius) = (DMat3::from_quat(pose.rotation).transpose(), collider.bounding_radius());
     // Turning moves no point farther than this, nor out of the ball around the shape.
     let turn = settings.dt * twist.angular.length() * radius;
-    let slack = settings.contact.margin + settings.dt * settings.dt * settings.gravity.length();
+    let slack = settings.contact.margin + settings.dt * (spread + settings.dt * settings.gravity.length());
     let turned = Kdop::of_intervals(|axis| {
         let (centre, (low, high)) = (axis.dot(pose.position), collider.shape().interval(to_shape * axis));
         (centre + (low - turn).max(-radius).min(low) - slack, centre + (high + turn).min(radius).max(high) + slack)

@@ -5,9 +5,12 @@
 //! points. What comes out are contact points; [`potential::contact`](crate::potential) makes potentials of them.
 
 mod boxes;
+mod cloud;
 mod collision;
+mod compound;
 mod convex;
 mod core;
+mod embedded_hull;
 mod gjk;
 mod groups;
 mod half_space;
@@ -30,6 +33,9 @@ use std::collections::BTreeMap;
 use glam::{DQuat, DVec3};
 
 pub use collision::{Collision, CollisionId, CollisionObject, CollisionSide, Phase};
+pub use compound::{Compound, PIECES_MAX, Piece};
+pub use embedded_hull::EmbeddedHull;
+pub(crate) use embedded_hull::Foot;
 pub use groups::Groups;
 pub use material::{Material, MaterialId, Surface};
 pub use proximity::{At, Proximity, proximity};
@@ -100,6 +106,8 @@ pub(crate) struct Moving<'a> {
     pub collider: &'a Collider,
     pub pose: Pose,
     pub twist: Twist,
+    /// How much faster than its twist says its surface may be where it deforms, m/s.
+    pub spread: f64,
 }
 
 /// The second half of a pair: another body or a piece of static geometry.

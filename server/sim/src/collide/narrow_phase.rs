@@ -380,7 +380,7 @@ fn margin(speed: f64, reach: f64, settings: &Settings) -> f64 {
     settings.contact.margin + settings.dt * (speed + settings.dt * settings.gravity.length()) + reach
 }
 
-/// How far a point of the body's surface may get in a tick by turning alone, m.
+/// How far a point of the body's surface may get in a tick by turning and deforming, m.
 fn reach(body: &Moving, settings: &Settings) -> f64 {
     // A surface of revolution stays where it is however fast it spins about its axis.
     let spin = body.twist.angular;
@@ -389,5 +389,5 @@ fn reach(body: &Moving, settings: &Settings) -> f64 {
         (_, Some(axis)) => spin.reject_from_normalized(body.pose.rotation * axis),
         _ => spin,
     };
-    (settings.dt * across.length()).min(2.0) * body.collider.bounding_radius()
+    (settings.dt * across.length()).min(2.0) * body.collider.bounding_radius() + settings.dt * body.spread
 }

@@ -161,7 +161,7 @@ impl Detector {
         let candidate = match found {
             Found::Hull(hull) => {
                 let object = CollisionObject::Body(hull.placed.body);
-                let collider = bodies.collider(&hull.placed)?;
+                let collider = hull.collider(bodies)?;
                 Candidate { order: (false, hull.owner), object, collider, pose: hull.pose()? }
             }
             Found::Piece(id) => {

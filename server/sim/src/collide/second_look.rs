@@ -48,14 +48,18 @@ struct Side<'a> {
     collider: &'a Collider,
     pose: Pose,
     twist: Twist,
+    /// Centre of mass of its body, m, and how that moves.
+    origin: DVec3,
+    carrier: Twist,
 }
 
 impl<'a> Candidates<'a> {
     fn side(&self, hull: &Hull) -> Option<Side<'a>> {
         let index = self.bodies.bodies.get(hull.placed.body)?.index;
-        let (pose, twist) = (*self.motions.get(index as usize)?)?;
-        let collider = self.bodies.collider(&hull.placed)?;
-        Some(Side { serial: hull.placed.serial, owner: hull.owner, collider, pose, twist })
+        let (body, carrier) = (*self.motions.get(index as usize)?)?;
+        let (pose, twist) = hull.placed.carried(body, carrier);
+        let (serial, owner, collider) = (hull.placed.serial, hull.owner, self.bodies.collider(&hull.placed)?);
+        Some(Side { serial, owner, collider, pose, twist, origin: body.position, carrier })
     }
 
     fn stride(&self, hull: &Hull, dt: f64) -> Stride {
@@ -101,7 +105,8 @@ impl Detector {
             }
             let Some(a) = candidates.side(hull) else { continue };
             let (serial, collider, pose) = (piece.serial, &piece.collider, piece.pose);
-            let b = Side { serial, owner: serial, collider, pose, twist: Twist::REST };
+            let (origin, twist) = (pose.position, Twist::REST);
+            let b = Side { serial, owner: serial, collider, pose, twist, origin, carrier: twist };
             look.at_pair(a, b, Partner::Static(serial), materials);
         }
         second.len() > known
@@ -137,10 +142,10 @@ impl Look<'_> {
         for point in found {
             // Momentum turns about where the bodies were at the start of the tick: a force on both at one point conserves
             // it only if the arms differ as they did then. What they have moved since is shared.
-            let moved = if partner_moves { self.dt * (b.twist.linear - a.twist.linear) } else { DVec3::ZERO };
-            let arms = [a.pose.position + moved / 2.0, b.pose.position - moved / 2.0];
+            let moved = if partner_moves { self.dt * (b.carrier.linear - a.carrier.linear) } else { DVec3::ZERO };
+            let arms = [a.origin + moved / 2.0, b.origin - moved / 2.0];
             let arms = arms.map(|origin| point.position - origin);
-            let moved = self.dt * (b.twist.at(arms[1]) - a.twist.at(arms[0]));
+            let moved = self.dt * (b.carrier.at(arms[1]) - a.carrier.at(arms[0]));
             let contact = ContactPoint::fresh(key, normal, point, surface);
             self.second.push(SecondPoint { contact, arms, start_gap: point.gap - moved.dot(normal) });
         }

@@ -7,6 +7,7 @@ use glam::{DQuat, DVec3};
 use parry3d_f64::math::Pose as ParryPose;
 use parry3d_f64::shape::{Cuboid, Cylinder, Segment};
 
+use super::cloud::Cloud;
 use super::convex::Convex;
 use super::core::{Core, Point, Polytope};
 use super::groups::Groups;
@@ -219,6 +220,24 @@ impl Collider {
         let bounding_radius = shape.bounding_radius();
         let (material, groups, is_sensor) = (material.into(), Groups::ALL, false);
         Self { shape, material, groups, is_sensor, core, bounding_radius }
+    }
+
+    /// A collider of what deforms: a hull of so many points, which are in one place until [`Collider::deform`] moves them.
+    pub(super) fn deforming(points: usize, radius: f64, material: impl Into<Material>) -> Self {
+        let points = vec![DVec3::ZERO; points];
+        let core = Some((Core::Cloud(Cloud::new(points.clone())), radius, DQuat::IDENTITY));
+        let (material, groups, is_sensor) = (material.into(), Groups::ALL, false);
+        Self { shape: Shape::Hull { points, radius }, material, groups, is_sensor, core, bounding_radius: radius }
+    }
+
+    /// Moves the points of what deforms.
+    pub(super) fn deform(&mut self, places: impl Iterator<Item = DVec3> + Clone) {
+        if let (Shape::Hull { points, .. }, Some((Core::Cloud(cloud), ..))) = (&mut self.shape, &mut self.core) {
+            cloud.deform(places.clone());
+            points.clear();
+            points.extend(places);
+        }
+        self.bounding_radius = self.shape.bounding_radius();
     }
 
     /// The same in other groups.

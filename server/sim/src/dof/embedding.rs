@@ -49,6 +49,11 @@ impl<const N: usize> EmbeddedPoint<N> {
         shares.map(|((weight, gradient), &point)| MountNode { point, weight, gradient }).collect()
     }
 
+    /// Place and velocity of the point.
+    pub fn place(&self, x: &[DVec3; N], v: &[DVec3; N]) -> [DVec3; 2] {
+        [self.mean(x), self.mean(v)]
+    }
+
     fn mean(&self, of: &[DVec3; N]) -> DVec3 {
         self.weights.iter().zip(of).map(|(&weight, &x)| weight * x).sum()
     }

@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 
 use super::Motion;
 use super::interface::{BLOCK_RATES_MAX, Dof, Inertia, LocalState, PartPoint};
-use crate::collide::Collider;
+use crate::collide::{Collider, EmbeddedHull};
 use crate::elimination::minimum_degree;
 use crate::error::{LARGEST, SimError, require, require_vector};
 use crate::integrate::figure::part_momentum;
@@ -38,6 +38,7 @@ pub struct PartCollider {
 pub(crate) struct FigureBody {
     pub dof: Arc<dyn Dof>,
     pub colliders: Vec<PartCollider>,
+    pub hulls: Vec<EmbeddedHull>,
     /// What steers it.
     pub controls: Vec<f64>,
     /// What code asked to act on each rate in the coming tick, N or N m.
@@ -109,7 +110,7 @@ impl FigureDesc {
 }
 
 impl FigureBody {
-    pub fn new(desc: FigureDesc) -> Self {
+    pub fn new(desc: FigureDesc, hulls: Vec<EmbeddedHull>) -> Self {
         let mass = match desc.dof.inertia() {
             Inertia::Parts(parts) => parts.iter().map(|part| part.mass).sum(),
             Inertia::Points(masses) => masses.total(),
@@ -119,7 +120,12 @@ impl FigureBody {
         let force = change.clone();
         let rods = vec![Memory::default(); desc.dof.rods().len()];
         let ranks = minimum_degree(desc.dof.blocks().len(), &couplings(&*desc.dof, &desc.q));
-        Self { controls, force, change, masses, ranks, mass, rods, dof: desc.dof, colliders: desc.colliders }
+        Self { controls, force, change, masses, ranks, mass, rods, dof: desc.dof, colliders: desc.colliders, hulls }
+    }
+
+    /// The embedded hull with this index among what the figure collides with.
+    pub fn hull(&self, index: u32) -> Option<&EmbeddedHull> {
+        self.hulls.get((index as usize).checked_sub(self.colliders.len())?)
     }
 
     /// Pulls at a material point with `force`, N, in the coming tick. What it does to each rate is that of where the figure

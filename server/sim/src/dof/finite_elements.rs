@@ -12,12 +12,15 @@
 //!
 //! Owns kinematics, inertia and elasticity of such bodies; knows nothing of worlds and islands.
 
+use std::collections::BTreeMap;
+
 use glam::{DMat3, DQuat, DVec3};
 
 use super::embedding::EmbeddedPoint;
 use super::interface::{BlockSize, Columns, Dof, Inertia, LocalState, PartPoint};
 use super::nodal::{Nodes, SharedMass, Slot, require_damping, viscosity};
 use super::{DofKind, Frame, Mount};
+use crate::collide::{EmbeddedHull, Material};
 use crate::error::SimError;
 use crate::mass::{Density, tetrahedron_mass};
 use crate::mesh::TetrahedralMesh;
@@ -108,6 +111,27 @@ impl FiniteElements {
         Some(PartPoint { part: part as u32, point: self.nodes.rest[place as usize] })
     }
 
+    /// A hull for every element that has a face on the surface: what the body collides with.
+    pub fn surface_hulls(&self, radius: f64, material: impl Into<Material>) -> Vec<EmbeddedHull> {
+        let material = material.into();
+        let face = |nodes: [u32; 4], without: usize| {
+            let mut face = [0, 1, 2, 3].map(|i| if i == without { u32::MAX } else { nodes[i] });
+            face.sort_unstable();
+            face
+        };
+        let mut faces = BTreeMap::new();
+        for Element { tetrahedron: Tetrahedron { nodes, .. }, .. } in &self.elements {
+            (0..4).for_each(|i| *faces.entry(face(*nodes, i)).or_insert(0) += 1);
+        }
+        let hull = |(part, element): (u32, &Element)| {
+            let nodes = element.tetrahedron.nodes;
+            let is_outside = (0..4).any(|i| faces[&face(nodes, i)] == 1);
+            let vertex = |node: u32| PartPoint { part, point: self.nodes.rest[node as usize] };
+            is_outside.then(|| EmbeddedHull::new(nodes.map(vertex).to_vec(), radius, material))
+        };
+        (0..).zip(&self.elements).filter_map(hull).collect()
+    }
+
     fn embedded(&self, at: PartPoint) -> ([u32; 4], EmbeddedPoint<4>) {
         let tetrahedron = &self.elements[at.part as usize].tetrahedron;
         let first = self.nodes.rest[tetrahedron.nodes[0] as usize];
@@ -134,6 +158,11 @@ impl Dof for FiniteElements {
     fn frame(&self, at: PartPoint, q: &[f64], v: &[f64]) -> Frame<f64> {
         let (nodes, point) = self.embedded(at);
         self.nodes.frame(nodes, &point, [q, v])
+    }
+
+    fn point(&self, at: PartPoint, q: &[f64], v: &[f64]) -> [DVec3; 2] {
+        let (nodes, point) = self.embedded(at);
+        self.nodes.point(nodes, &point, [q, v])
     }
 
     fn jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns)) {

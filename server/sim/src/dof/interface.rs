@@ -138,6 +138,12 @@ pub trait Dof: Send + Sync {
     /// The frame at a material point, with the rotation of the part there.
     fn frame(&self, at: PartPoint, q: &[f64], v: &[f64]) -> Frame<f64>;
 
+    /// Place, m, and velocity, m/s, of a material point, for kinds to which that is less work than its frame.
+    fn point(&self, at: PartPoint, q: &[f64], v: &[f64]) -> [DVec3; 2] {
+        let frame = self.frame(at, q, v);
+        [frame.position.into(), frame.linear.into()]
+    }
+
     /// Hands `visit` every block that moves the frame at a material point, with the frame's derivatives.
     fn jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns));
 

@@ -108,7 +108,8 @@ pub(crate) struct Body {
     pub mass: f64,
     /// Principal moments, kg m²; zero for a particle.
     pub inertia: DVec3,
-    pub collider: Option<Collider>,
+    /// What it collides with, by the indices of [`Placed`]; a figure has its own.
+    pub colliders: Vec<Collider>,
     /// What a body of a general kind is.
     pub figure: Option<FigureBody>,
     /// Force and torque about the centre of mass asked for by code, for the coming tick, N and N m; a figure has its own.
@@ -134,12 +135,26 @@ pub(crate) struct Placed {
     /// Counts up with every body and every further collider of a body; never used twice.
     pub serial: u32,
     pub body: BodyId,
-    /// The collider's origin; axes are the part's.
+    /// The collider's origin.
     pub at: PartPoint,
-    /// Among the figure's colliders.
+    /// The collider's axes to the part's.
+    pub rotation: DQuat,
+    /// Among the body's colliders, or the figure's; its embedded hulls come after those.
     pub index: u32,
     /// What detection calls it.
     pub hull: u32,
+}
+
+impl Placed {
+    /// Where the collider is on a rigid body, and how it moves.
+    pub fn carried(&self, pose: Pose, twist: Twist) -> (Pose, Twist) {
+        if self.at.point == DVec3::ZERO && self.rotation == DQuat::IDENTITY {
+            return (pose, twist);
+        }
+        let arm = pose.rotation * self.at.point;
+        let rotation = (pose.rotation * self.rotation).normalize();
+        (Pose { position: pose.position + arm, rotation }, Twist { linear: twist.at(arm), ..twist })
+    }
 }
 
 /// Index of a body that does not take part.

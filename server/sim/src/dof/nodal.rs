@@ -74,6 +74,12 @@ impl Nodes {
         Mount::Points { nodes: moving, position, deformation }
     }
 
+    /// Place and velocity of a point of an element.
+    pub fn point<const N: usize>(&self, nodes: [u32; N], point: &EmbeddedPoint<N>, [q, v]: [&[f64]; 2]) -> [DVec3; 2] {
+        let velocities = nodes.map(|node| if self.moves(node) { numbers_of(node, v) } else { DVec3::ZERO });
+        point.place(&self.places(nodes, q), &velocities)
+    }
+
     /// Hands `visit` the nodes of an element that move, with the derivatives of the frame at a point of it.
     pub fn jacobian<const N: usize>(
         &self,

@@ -9,6 +9,7 @@ use crate::dof::{Columns, Frame, PartPoint, Twist};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Attachment {
     pub figure: u32,
+    /// [`ABSENT`](crate::dof::ABSENT) is the part of a point between vertices.
     pub at: PartPoint,
     /// Its derivatives stay what they were at the start of the tick.
     pub frozen: bool,

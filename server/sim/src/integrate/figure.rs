@@ -9,7 +9,10 @@ use glam::{DMat3, DVec3};
 use super::attachment::{Attachment, Influence, trace};
 use super::block::{Block, Entry, zero};
 use super::pull_back::{add_block, inertia_block, multiplied, projected};
-use crate::dof::{Dof, FigureBody, Frame, Inertia, LocalState, PartInertia, PartLoad, PartPoint, PointMasses, Twist};
+use crate::collide::Foot;
+use crate::dof::{
+    ABSENT, Columns, Dof, FigureBody, Frame, Inertia, LocalState, PartInertia, PartLoad, PartPoint, PointMasses, Twist,
+};
 use crate::potential::Wrench;
 use crate::potential::gravity::Gravity;
 
@@ -142,6 +145,30 @@ impl Figures {
         let start = owner.dof.frame(at, &owner.q0, &owner.v0);
         let movers = &influences[first as usize..];
         let (mass, inverse_inertia) = (owner.mass_at(at, movers), owner.inverse_inertia_at(at, movers));
+        self.attachments.push(Attachment { figure, at, frozen, influences: range, start, mass, inverse_inertia });
+        self.attachments.len() as u32 - 1
+    }
+
+    /// Makes a frame, which does not turn, of a point between vertices. Answers its index among the attachments.
+    pub fn attach_foot(&mut self, figure: u32, foot: &Foot) -> u32 {
+        let Self { list, influences, .. } = self;
+        let owner = &list[figure as usize];
+        let first = influences.len();
+        let (mut position, mut velocity) = (DVec3::ZERO, DVec3::ZERO);
+        for &(at, weight) in foot.iter().filter(|(_, weight)| *weight > 0.0) {
+            let [place, moves] = owner.dof.point(at, &owner.q0, &owner.v0);
+            position += weight * place;
+            velocity += weight * moves;
+            owner.dof.jacobian(at, &owner.q0, &mut |own_block, columns| {
+                add_influence(influences, first, owner, own_block, weight, columns);
+            });
+        }
+        let range = (first as u32, influences.len() as u32);
+        let mass = owner.mass_at(foot[0].0, &influences[first..]);
+        // No other attachment is at the same place.
+        let at = PartPoint { part: ABSENT, point: position };
+        let start = Frame::point(position, velocity);
+        let (frozen, inverse_inertia) = (true, 0.0);
         self.attachments.push(Attachment { figure, at, frozen, influences: range, start, mass, inverse_inertia });
         self.attachments.len() as u32 - 1
     }
@@ -474,6 +501,32 @@ impl Figure {
             let scaled = block.map(|r| r.map(|x| x * dt * dt));
             blocks.add(self.blocks[row], self.blocks[column], &scaled);
         });
+    }
+}
+
+/// Adds how a block moves a vertex to the influences from `first` on; what does not move it is left out.
+fn add_influence(
+    influences: &mut Vec<Influence>,
+    first: usize,
+    owner: &Figure,
+    own_block: usize,
+    weight: f64,
+    columns: &Columns,
+) {
+    let size = owner.dof.blocks()[own_block].rates;
+    let linear = |column: &[f64; 6]| DVec3::from_slice(column) * weight;
+    if columns[..usize::from(size)].iter().all(|column| linear(column) == DVec3::ZERO) {
+        return;
+    }
+    let block = owner.blocks[own_block];
+    let known = influences[first..].iter().position(|influence| influence.block == block);
+    let place = known.map_or(influences.len(), |known| first + known);
+    if known.is_none() {
+        influences.push(Influence { block, own_block: own_block as u32, size, columns: Columns::default() });
+    }
+    for (sum, column) in influences[place].columns.iter_mut().zip(columns) {
+        let added = DVec3::from_slice(&sum[..]) + linear(column);
+        sum[..3].copy_from_slice(&added.to_array());
     }
 }
 

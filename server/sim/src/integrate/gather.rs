@@ -6,7 +6,7 @@ use super::attachment::trace;
 use super::problem::{Rates, Unknown};
 use super::step::{Integrator, Scene, Solve};
 use super::wheels;
-use crate::collide::{ContactPoint, Partner, Surface};
+use crate::collide::{ContactPoint, Foot, Partner, Surface};
 use crate::dof::{ABSENT, BLOCK_RATES_MAX, BodyId, FigureBody, Frame, Inertia, Node, PartPoint, Placed, Twist};
 use crate::island::Islands;
 use crate::potential::ball_joint::BallJointTerm;
@@ -35,6 +35,8 @@ pub(super) enum Spot {
     World,
     /// The body with this index among the active ones.
     Body(u32, PartPoint),
+    /// Between vertices of a hull that is embedded in the body.
+    Vertices(u32, Foot),
 }
 
 impl Spot {
@@ -42,7 +44,7 @@ impl Spot {
     pub fn body(self) -> Option<u32> {
         match self {
             Self::World => None,
-            Self::Body(index, _) => Some(index),
+            Self::Body(index, _) | Self::Vertices(index, _) => Some(index),
         }
     }
 }
@@ -82,10 +84,10 @@ impl Integrator {
         let anchors = scene.potentials.pairs().map(|[a, b]| Some([spot(scene, a)?, spot(scene, b)?]));
         let second = scene.second.iter().map(|point| contact_spots(scene, &point.contact));
         for spots in contacts.chain(second).chain(anchors).flatten() {
-            match spots {
-                [Spot::Body(a, _), Spot::Body(b, _)] => self.islands.couple(a, b),
-                [Spot::Body(a, _), Spot::World] | [Spot::World, Spot::Body(a, _)] => self.islands.touch(a),
-                [Spot::World, Spot::World] => {}
+            match spots.map(Spot::body) {
+                [Some(a), Some(b)] => self.islands.couple(a, b),
+                [Some(a), None] | [None, Some(a)] => self.islands.touch(a),
+                [None, None] => {}
             }
         }
         self.islands.finish();
@@ -94,10 +96,7 @@ impl Integrator {
 
     /// The island of two spots, and their ends in it; `None` where that has all its potentials already. `frozen` ends keep the derivatives of the start.
     pub(super) fn localise(&mut self, spots: [Spot; 2], frozen: bool) -> Option<(&mut Solve, [End; 2])> {
-        let island = |spot: Spot| match spot {
-            Spot::World => Islands::FREE,
-            Spot::Body(index, _) => self.islands.island_of(index),
-        };
+        let island = |spot: Spot| spot.body().map_or(Islands::FREE, |index| self.islands.island_of(index));
         let solve = self.solves.get_mut(island(spots[0]).min(island(spots[1])) as usize)?;
         if !solve.is_gathering {
             return None;
@@ -111,6 +110,10 @@ impl Integrator {
                     End { frame: solve.problem.len() as u32 + attachment, point: DVec3::ZERO }
                 }
             },
+            Spot::Vertices(index, foot) => {
+                let attachment = solve.problem.figures.attach_foot(self.active[index as usize].figure, &foot);
+                End { frame: solve.problem.len() as u32 + attachment, point: DVec3::ZERO }
+            }
         };
         let ends = spots.map(&mut end);
         Some((solve, ends))
@@ -185,7 +188,9 @@ impl Integrator {
     fn gather_contacts(&mut self, scene: &Scene) {
         let Settings { dt, contact: settings, .. } = scene.settings;
         let mut source = 0;
-        for points in scene.contacts.chunk_by(ContactPoint::same_pair) {
+        // Points of a pair share the frames of its colliders; vertices beneath a point are its own.
+        let shares = |a: &ContactPoint, b: &ContactPoint| a.same_pair(b) && !is_embedded(scene, a);
+        for points in scene.contacts.chunk_by(shares) {
             let sources = (source..).take(points.len());
             source += points.len() as u32;
             let Some(spots) = contact_spots(scene, &points[0]) else { continue };
@@ -394,20 +399,48 @@ fn spot(scene: &Scene, anchor: Anchor) -> Option<Spot> {
     Some(Spot::Body(body.index, PartPoint { part: anchor.part, point: anchor.point }))
 }
 
-/// Where a contact acts: at the frames of the two colliders; nowhere if logic lets the pair pass.
+/// Where a contact acts: at the frames of the two colliders, or between the vertices of one that is embedded; nowhere if
+/// logic lets the pair pass.
 pub(super) fn contact_spots(scene: &Scene, contact: &ContactPoint) -> Option<[Spot; 2]> {
     if contact.is_cancelled {
         return None;
     }
-    let spot = |serial: u32| {
-        let place = scene.placed.binary_search_by_key(&serial, |placed| placed.serial).ok()?;
-        let Placed { body, at, .. } = scene.placed[place];
-        let index = scene.bodies[body].index;
-        (index != ABSENT).then_some(Spot::Body(index, at))
+    let spot = |serial: u32, outward: DVec3| {
+        let &Placed { body, at, index, .. } = placed(scene, serial)?;
+        let body = &scene.bodies[body];
+        let hull = body.figure.as_ref().and_then(|figure| Some((figure, figure.hull(index)?)));
+        let spot = match hull {
+            None => Spot::Body(body.index, at),
+            Some((figure, hull)) => {
+                let (q, v) = (scene.state.q(body.slice), scene.state.v(body.slice));
+                let core = contact.position - outward * (contact.gap / 2.0 + hull.radius());
+                Spot::Vertices(body.index, hull.foot(core, outward, |at| figure.dof.point(at, q, v)[0]))
+            }
+        };
+        (body.index != ABSENT).then_some(spot)
     };
     let b = match contact.b {
-        Partner::Body(serial) => spot(serial)?,
+        Partner::Body(serial) => spot(serial, -contact.normal)?,
         Partner::Static(_) => Spot::World,
     };
-    Some([spot(contact.a)?, b])
+    Some([spot(contact.a, contact.normal)?, b])
+}
+
+/// A collider by its serial.
+fn placed<'a>(scene: &'a Scene, serial: u32) -> Option<&'a Placed> {
+    let place = scene.placed.binary_search_by_key(&serial, |placed| placed.serial).ok()?;
+    Some(&scene.placed[place])
+}
+
+/// Whether one side of a contact is a hull that is embedded.
+fn is_embedded(scene: &Scene, contact: &ContactPoint) -> bool {
+    let embedded = |serial: u32| {
+        let placed = placed(scene, serial)?;
+        scene.bodies[placed.body].figure.as_ref()?.hull(placed.index)
+    };
+    let other = match contact.b {
+        Partner::Body(serial) => embedded(serial),
+        Partner::Static(_) => None,
+    };
+    other.or_else(|| embedded(contact.a)).is_some()
 }

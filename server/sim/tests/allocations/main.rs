@@ -5,6 +5,7 @@
 use std::alloc::System;
 use std::sync::Arc;
 
+use pita_sim::collide::{Compound, Piece};
 use pita_sim::mass::{Density, MassProperties, Polyhedron};
 use pita_sim::mesh::TetrahedralMesh;
 use pita_sim::potential::elasticity::Elastic;
@@ -118,6 +119,20 @@ fn jelly(world: &mut World) {
     add(world, Arc::new(jelly), q, &at);
 }
 
+/// The same, on hulls that deform, and a table on it.
+fn jelly_of_hulls(world: &mut World) {
+    let mesh = TetrahedralMesh::of_box(DVec3::ZERO, DVec3::ONE, [2, 1, 2]).unwrap();
+    let material = Elastic::new(1e5, 0.3).unwrap();
+    let jelly = FiniteElements::new(&mesh, material, Density::constant(300.0), &[]).unwrap().damped(0.01).unwrap();
+    let hulls = jelly.surface_hulls(0.02, 0.5);
+    let (q, v) = (jelly.placed(DVec3::Y * 0.5, DQuat::IDENTITY), jelly.still());
+    let desc = FigureDesc { dof: Arc::new(jelly), q, v, colliders: Vec::new() };
+    world.add_figure_with_hulls(desc, hulls).unwrap();
+    let foot = |x: f64| Piece::new(collider(), DVec3::X * x, 100.0);
+    let compound = Compound::new(vec![foot(-0.2), foot(0.3)]).unwrap();
+    world.add_compound(&compound, DVec3::new(0.5, 2.0, 0.5), DQuat::IDENTITY).unwrap();
+}
+
 fn lattice(world: &mut World) {
     let corners: Vec<DVec3> =
         (0..8u8).map(|i| DVec3::from_array([1, 2, 4].map(|b| f64::from(u8::from(i & b > 0))))).collect();
@@ -134,12 +149,13 @@ fn lattice(world: &mut World) {
 #[test]
 fn a_warm_tick_allocates_nothing() {
     type Scene = (&'static str, fn(&mut World));
-    let scenes: [Scene; 6] = [
+    let scenes: [Scene; 7] = [
         ("sheep of bodies", bodies),
         ("sheep in independent coordinates", articulated),
         ("sheep in natural coordinates", natural),
         ("chain", chain),
         ("jelly", jelly),
+        ("jelly of hulls", jelly_of_hulls),
         ("lattice", lattice),
     ];
     for (name, build) in scenes {

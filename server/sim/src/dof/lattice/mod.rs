@@ -26,6 +26,7 @@ use super::embedding::EmbeddedPoint;
 use super::interface::{BlockSize, Columns, Dof, Inertia, LocalState, PartPoint, PointMasses};
 use super::nodal::{Nodes, SharedMass, Slot, require_damping, viscosity};
 use super::{DofKind, Frame, Mount};
+use crate::collide::{EmbeddedHull, Material};
 use crate::error::{SimError, require, require_vector};
 use crate::mass::{Density, Polyhedron, lattice_cell_mass, trilinear};
 use crate::potential::elasticity::{Curvature, Elastic, Tangent};
@@ -182,6 +183,19 @@ impl Lattice {
         Some(PartPoint { part, point })
     }
 
+    /// The hull of points of the body's frame: what the body, or a convex piece of it, collides with.
+    ///
+    /// # Errors
+    /// [`SimError`] naming a point outside of the cells that have something in them.
+    pub fn hull(&self, points: &[DVec3], radius: f64, material: impl Into<Material>) -> Result<EmbeddedHull, SimError> {
+        let vertex = |(index, &point): (usize, &DVec3)| {
+            let outside = SimError::Unusable { what: "it lies outside of the lattice's cells" };
+            self.at(point).ok_or_else(|| outside.of(format!("point {index}")))
+        };
+        let vertices = points.iter().enumerate().map(vertex).collect::<Result<_, _>>()?;
+        Ok(EmbeddedHull::new(vertices, radius, material))
+    }
+
     fn embedded(&self, at: PartPoint) -> ([u32; CORNERS], EmbeddedPoint<CORNERS>) {
         let cell = &self.cells[at.part as usize];
         let place = (at.point - cell.min) / self.size;
@@ -259,6 +273,11 @@ impl Dof for Lattice {
     fn frame(&self, at: PartPoint, q: &[f64], v: &[f64]) -> Frame<f64> {
         let (nodes, point) = self.embedded(at);
         self.nodes.frame(nodes, &point, [q, v])
+    }
+
+    fn point(&self, at: PartPoint, q: &[f64], v: &[f64]) -> [DVec3; 2] {
+        let (nodes, point) = self.embedded(at);
+        self.nodes.point(nodes, &point, [q, v])
     }
 
     fn jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns)) {

@@ -87,7 +87,7 @@ proptest! {
         let v = figure.moving(&q, props.centre, velocity, spin);
         let desc = super::super::FigureDesc { dof: std::sync::Arc::new(figure), q, v, colliders: Vec::new() };
         let (q, v) = (desc.q.clone(), desc.v.clone());
-        let motion = super::super::FigureBody::new(desc).motion(&q, &v);
+        let motion = super::super::FigureBody::new(desc, Vec::new()).motion(&q, &v);
         let angular = props.inertia() * spin;
         prop_assert!((motion.momentum - 5.0 * velocity).length() < 1e-12);
         prop_assert!((motion.moment - 5.0 * props.centre).length() < 1e-12);
