@@ -24,6 +24,7 @@ pub struct SessionBuilder {
     pub(crate) loss_timeout: Duration,
     pub(crate) interpolation: Option<InterpolationSettings>,
     pub(crate) conditioner: Option<ConditionerSettings>,
+    bytes_per_s: Option<u32>,
     resume: Option<ResumeTicket>,
     #[cfg(feature = "prediction")]
     pub(crate) prediction: bool,
@@ -65,6 +66,7 @@ impl SessionBuilder {
             loss_timeout: Duration::from_secs(3),
             interpolation: Some(InterpolationSettings::default()),
             conditioner: None,
+            bytes_per_s: None,
             resume: None,
             #[cfg(feature = "prediction")]
             prediction: false,
@@ -102,6 +104,12 @@ impl SessionBuilder {
         self
     }
 
+    /// How much of the state to be sent, bytes/s, for a slow connection: 8000 at least. Otherwise what the server gives.
+    pub fn bytes_per_s(mut self, budget: u32) -> Self {
+        self.bytes_per_s = Some(budget);
+        self
+    }
+
     /// Goes on with an earlier session, in the same slot and car, where the server still keeps them. A ticket is good for
     /// once: the session that comes of it has one of its own.
     pub fn resume(mut self, ticket: ResumeTicket) -> Self {
@@ -130,7 +138,7 @@ impl SessionBuilder {
     /// Any [`ClientError`] but [`Spectator`](ClientError::Spectator) and [`Ended`](ClientError::Ended).
     pub async fn connect(self) -> Result<Session, ClientError> {
         let resume = self.resume.as_ref().map(ResumeTicket::proof);
-        let request = JoinRequest { name: self.name.clone(), role: self.role, resume };
+        let request = JoinRequest { name: self.name.clone(), role: self.role, bytes_per_s: self.bytes_per_s, resume };
         request.validate().map_err(ClientError::BadArgument)?;
         let zenoh = transport::open(&self.endpoint, self.connect_timeout).await?;
         let joined = join(&self, &zenoh, request).await;

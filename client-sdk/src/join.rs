@@ -26,6 +26,9 @@ use crate::{
 #[cfg(feature = "prediction")]
 use {crate::prediction::Predictor, pita_protocol::message::ArenaSource, std::sync::Mutex};
 
+/// How often a spectator, who drives nothing, says which snapshots it has: what they are coded against must not get old.
+const ACKNOWLEDGED: Duration = Duration::from_millis(66);
+
 /// What is declared for as long as a session lives.
 #[derive(Debug)]
 pub struct Declared {
@@ -70,7 +73,8 @@ pub async fn join(
         actor: accepted.actor,
         joined_at: accepted.description.event_sequence,
         loss_timeout: wanted.loss_timeout,
-        keep_alive: silent_otherwise.then(|| Duration::from_millis(accepted.input_timeout_ms.into()) / 3),
+        keep_alive: silent_otherwise
+            .then(|| ACKNOWLEDGED.min(Duration::from_millis(accepted.input_timeout_ms.into()) / 3)),
         shared: Arc::clone(&shared),
         wire: Arc::clone(&wire),
     };

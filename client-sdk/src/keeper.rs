@@ -58,7 +58,8 @@ impl Keeper {
     pub async fn run(self, Incoming(mut events): Incoming) {
         let mut checks = tokio::time::interval(CHECK_PERIOD);
         checks.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
-        let mut sent = Instant::now();
+        let mut alive = tokio::time::interval(self.keep_alive.unwrap_or(CHECK_PERIOD));
+        alive.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
         let mut announced = 0;
         let mut is_bereft = false;
         while self.shared.end().is_none() {
@@ -70,10 +71,9 @@ impl Keeper {
                 _ = checks.tick() => {
                     self.check(&mut announced).await;
                     self.check_actor(&mut is_bereft);
-                    if self.keep_alive.is_some_and(|period| sent.elapsed() >= period) {
-                        sent = Instant::now();
-                        let _ = self.wire.send(Controls::default(), false).await;
-                    }
+                }
+                _ = alive.tick(), if self.keep_alive.is_some() => {
+                    let _ = self.wire.send(Controls::default(), false).await;
                 }
             }
         }

@@ -39,6 +39,9 @@ pub struct JoinRequest {
     pub name: String,
     /// Player or spectator.
     pub role: Role,
+    /// How much of the state it wants to be sent, bytes/s; the server gives no more than its configuration allows, and not
+    /// less than 8000. `None` for what the server gives.
+    pub bytes_per_s: Option<u32>,
     /// The earlier session that is to go on, where it is not over yet; name and role stay what they were.
     pub resume: Option<ResumeProof>,
 }
@@ -442,7 +445,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn join(name: &str) -> JoinRequest {
-        JoinRequest { name: name.to_owned(), role: Role::Player, resume: None }
+        JoinRequest { name: name.to_owned(), role: Role::Player, bytes_per_s: None, resume: None }
     }
 
     fn packet(throttle: f32) -> InputPacket {

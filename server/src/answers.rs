@@ -16,7 +16,7 @@ use zenoh::Wait;
 use zenoh::query::Query;
 
 use crate::metrics;
-use crate::sessions::{EndReason, JoinRefusal, Secrets, SessionId};
+use crate::sessions::{EndReason, JoinRefusal, Secrets, SessionId, Wish};
 use crate::shared::Shared;
 
 /// Most queries that wait; further ones are dropped, and their askers time out.
@@ -181,7 +181,10 @@ impl Answering {
         let now_ms = self.shared.clock.ms();
         let joined = match &request.resume {
             Some(proof) => sessions.resume(proof, secrets, now_ms),
-            None => sessions.join(&request.name, request.role, secrets, now_ms),
+            None => {
+                let JoinRequest { name, role, bytes_per_s, .. } = &request;
+                sessions.join(Wish { name, role: *role, bytes_per_s: *bytes_per_s }, secrets, now_ms)
+            }
         };
         let id = joined.map_err(|refusal| match refusal {
             JoinRefusal::Full => Refusal::Full { slots: sessions.slots_of(request.role) },

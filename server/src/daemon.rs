@@ -160,6 +160,7 @@ fn share(config: &ServerConfig, arena: &Arena, source: String, clock: Clock) -> 
                 input_timeout_ms: limits.input_timeout_ms.get().into(),
                 resume_grace_ms: limits.resume_grace_ms.get().into(),
                 inputs_per_tick: inputs,
+                bytes_per_s: config.network.client_bytes_per_s.get(),
             },
             &config.bans.names,
         ),

@@ -8,8 +8,9 @@ use crossbeam_queue::ArrayQueue;
 use pita_game::{ActorInfo, ArenaEvent};
 use pita_protocol::dof::{BODY_GROUPS_MAX, Group, State, kind, relative};
 use pita_protocol::message::{InputAck, InputCounts, TickRecord};
-use pita_sim::{BlockSize, DofKind, World};
+use pita_sim::{BlockSize, DofKind, SliceView, World};
 
+use crate::crowd::{Crowd, Family};
 use crate::sessions::SessionId;
 
 /// Frames in circulation: one being filled, one being published, and what a publishing thread that was held up for a
@@ -64,12 +65,23 @@ struct Dof {
     numbers: Vec<f64>,
     /// Parts of actors with the first part of each.
     attached: Vec<(u32, u32)>,
+    actors: Vec<ActorHead>,
+}
+
+/// An actor by the slice of its first part.
+#[derive(Clone, Copy)]
+struct ActorHead {
+    root: u32,
+    slot: Option<u16>,
+    importance: f32,
 }
 
 #[derive(Clone, Copy)]
 struct SliceHead {
     id: u32,
     kind: u8,
+    /// Of its first point, m/s.
+    speed: f32,
     groups: Span,
     numbers: Span,
 }
@@ -88,25 +100,26 @@ impl Span {
 }
 
 impl Frame {
-    /// Copies the state of `world`, in which `actors` are; events, records and acknowledgements are the caller's.
-    pub fn copy_state<'a>(&mut self, world: &World, actors: impl Iterator<Item = &'a ActorInfo>) {
+    /// Copies the state of `world`, in which `actors` are, each with its relevance; events, records and acknowledgements are the caller's.
+    pub fn copy_state<'a>(&mut self, world: &World, actors: impl Iterator<Item = (&'a ActorInfo, f32)>) {
         self.state_hash = world.state_hash();
         self.bodies = u32::try_from(world.body_count()).unwrap_or(u32::MAX);
         self.dof.clear();
         for slice in world.slices() {
-            self.dof.push(slice.serial, kind_on_wire(slice.kind), slice.blocks, slice.q);
+            self.dof.push(&slice);
         }
-        for actor in actors {
+        for (actor, importance) in actors {
             if let Some((first, others)) = actor.parts.split_first() {
+                self.dof.actors.push(ActorHead { root: first.slice, slot: actor.slot, importance });
                 let others = others.iter().filter(|part| part.slice != first.slice);
                 self.dof.attached.extend(others.map(|part| (part.slice, first.slice)));
             }
         }
     }
 
-    /// All slices in order of their id, in steps; parts of an actor as seen from its first part.
-    pub fn quantise(&mut self, into: &mut State) {
-        self.dof.quantise(into);
+    /// All slices in order of their id, in steps, parts of an actor as seen from its first part; and who they are.
+    pub fn quantise(&mut self, into: &mut State, crowd: &mut Crowd) {
+        self.dof.quantise(into, crowd);
     }
 
     fn clear(&mut self) {
@@ -123,25 +136,34 @@ impl Dof {
         self.layouts.clear();
         self.numbers.clear();
         self.attached.clear();
+        self.actors.clear();
     }
 
     /// A slice of more groups than a body may have on the wire is left out: nobody sees it.
-    fn push(&mut self, id: u32, kind: u8, blocks: &[BlockSize], q: &[f64]) {
+    fn push(&mut self, slice: &SliceView<'_>) {
         let (groups, numbers) = (self.layouts.len(), self.numbers.len());
-        blocks.iter().for_each(|block| self.layouts.extend(groups_of(kind, *block)));
+        let kind = kind_on_wire(slice.kind);
+        slice.blocks.iter().for_each(|block| self.layouts.extend(groups_of(kind, *block)));
         let len = self.layouts.len() - groups;
         if !(1..=BODY_GROUPS_MAX).contains(&len) {
             return self.layouts.truncate(groups);
         }
         let span = |start: usize, len: usize| Span { start: start as u32, len: len as u32 };
-        self.heads.push(SliceHead { id, kind, groups: span(groups, len), numbers: span(numbers, q.len()) });
-        self.numbers.extend_from_slice(q);
+        let speed = match self.layouts[groups] {
+            Group::Point => slice.v[..3].iter().map(|v| v * v).sum::<f64>().sqrt() as f32,
+            _ => 0.0,
+        };
+        let (groups, numbers) = (span(groups, len), span(numbers, slice.q.len()));
+        self.heads.push(SliceHead { id: slice.serial, kind, speed, groups, numbers });
+        self.numbers.extend_from_slice(slice.q);
     }
 
-    fn quantise(&mut self, into: &mut State) {
+    fn quantise(&mut self, into: &mut State, crowd: &mut Crowd) {
         self.heads.sort_unstable_by_key(|head| head.id);
         self.attached.sort_unstable();
+        self.actors.sort_unstable_by_key(|actor| actor.root);
         into.clear();
+        crowd.clear();
         for head in &self.heads {
             let parent = self.parent(head);
             let q = self.q(head);
@@ -152,13 +174,37 @@ impl Dof {
             if pushed.is_err() {
                 break;
             }
+            if !self.root_of(head.id).is_some_and(|root| crowd.add_member(root)) {
+                crowd.add_root(self.family(head));
+            }
+        }
+    }
+
+    /// The first slice of the actor that `id` is a further slice of.
+    fn root_of(&self, id: u32) -> Option<u32> {
+        let at = self.attached.binary_search_by_key(&id, |(part, _)| *part).ok()?;
+        Some(self.attached[at].1)
+    }
+
+    fn family(&self, head: &SliceHead) -> Family {
+        let actor = self.actors.binary_search_by_key(&head.id, |actor| actor.root).ok().map(|at| self.actors[at]);
+        let position = match head.groups.of(&self.layouts)[0] {
+            Group::Point => [0, 1, 2].map(|i| self.q(head)[i] as f32),
+            _ => [0.0; 3],
+        };
+        Family {
+            root: head.id,
+            position,
+            speed: head.speed,
+            importance: actor.map_or(1.0, |actor| actor.importance),
+            slot: actor.and_then(|actor| actor.slot),
         }
     }
 
     /// The body in whose frame `head` is coded: an earlier one, both of them rigid.
     fn parent(&self, head: &SliceHead) -> Option<&SliceHead> {
-        let at = self.attached.binary_search_by_key(&head.id, |(part, _)| *part).ok()?;
-        let parent = self.heads.binary_search_by_key(&self.attached[at].1, |head| head.id).ok()?;
+        let root = self.root_of(head.id)?;
+        let parent = self.heads.binary_search_by_key(&root, |head| head.id).ok()?;
         let parent = &self.heads[parent];
         let are_rigid = head.kind == kind::RIGID_BODY && parent.kind == kind::RIGID_BODY;
         (are_rigid && parent.id < head.id).then_some(parent)
@@ -249,17 +295,24 @@ mod tests {
 
     #[test]
     fn slices_come_in_order_of_id_and_parts_as_their_first_part_sees_them() {
-        let mut dof = Dof::default();
-        let body = [BlockSize { positions: 7, rates: 6 }];
-        let point = [BlockSize { positions: 3, rates: 3 }];
-        dof.push(9, kind::RIGID_BODY, &body, &[12.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]);
-        dof.push(5, kind::PARTICLE, &point, &[1.0, 2.0, f64::NAN]);
-        dof.push(4, kind::RIGID_BODY, &body, &[10.0, 2.0, 3.0, 0.0, 1.0, 0.0, 0.0]);
+        let (mut dof, mut crowd) = (Dof::default(), Crowd::default());
+        let mut push = |serial, kind, (positions, rates), q: &[f64]| {
+            dof.push(&SliceView { serial, kind, blocks: &[BlockSize { positions, rates }], q, v: &[3.0, 4.0, 0.0] });
+        };
+        push(9, DofKind::RigidBody, (7, 6), &[12.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]);
+        push(5, DofKind::Particle, (3, 3), &[1.0, 2.0, f64::NAN]);
+        push(4, DofKind::RigidBody, (7, 6), &[10.0, 2.0, 3.0, 0.0, 1.0, 0.0, 0.0]);
+        push(11, DofKind::Own("clock"), (1, 1), &[0.5]);
         dof.attached.extend([(5, 4), (9, 4)]);
+        dof.actors.push(ActorHead { root: 4, slot: Some(7), importance: 2.0 });
         let mut state = State::new(Precision::default()).unwrap();
-        dof.quantise(&mut state);
+        dof.quantise(&mut state, &mut crowd);
+        assert_eq!(crowd.of_bodies(), [0, 0, 0, 1]);
+        let car = Family { root: 4, position: [10.0, 2.0, 3.0], speed: 5.0, importance: 2.0, slot: Some(7) };
+        let clock = Family { root: 11, position: [0.0; 3], speed: 0.0, importance: 1.0, slot: None };
+        assert_eq!(crowd.families(), [car, clock]);
         let bodies: Vec<_> = state.bodies().iter().map(|body| (body.id, body.parent)).collect();
-        assert_eq!(bodies, [(4, None), (5, None), (9, Some(4))]);
+        assert_eq!(bodies, [(4, None), (5, None), (9, Some(4)), (11, None)]);
         // Half a turn about y.
         assert_eq!(state.groups(&state.bodies()[2])[0].steps, [-2000, 0, 0]);
         assert_eq!(state.groups(&state.bodies()[1])[0].steps, [1000, 2000, 0]);

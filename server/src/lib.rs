@@ -11,7 +11,7 @@
 //!
 //! The tick thread ([`tick_thread`]) waits for its next tick and for nothing else. Queues between threads are bounded
 //! and lock-free; locks are shared only by threads that serve the network. Pure, and tested without threads: sessions
-//! ([`sessions`]), pacing ([`pacer`]), controls ([`drivers`]), matching of players and sessions ([`boarding`]).
+//! ([`sessions`]), who is sent to whom ([`selection`]), pacing ([`pacer`]), controls ([`drivers`]), matching of players and sessions ([`boarding`]).
 
 pub mod answers;
 pub mod arena_source;
@@ -20,6 +20,7 @@ pub mod check;
 pub mod cli;
 pub mod config;
 pub mod counters;
+pub mod crowd;
 pub mod daemon;
 pub mod description;
 pub mod drivers;
@@ -31,6 +32,7 @@ pub mod output;
 pub mod pacer;
 pub mod publish;
 pub mod report;
+pub mod selection;
 pub mod sessions;
 pub mod shared;
 pub mod simulate;

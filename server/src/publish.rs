@@ -1,7 +1,8 @@
 //! The publishing thread: everything that leaves for clients without being asked for.
 //!
 //! Owns the declared publishers, one for each session and one for events, the numbering of events and the description
-//! that they add up to. It wakes for every frame, quantises the state once, and puts one snapshot for each session. Nothing
+//! that they add up to. It wakes for every frame, quantises the state once, and puts one snapshot for each session, of what its
+//! [selection](crate::selection) takes. Nothing
 //! here waits for a client: snapshots and events are dropped where a connection takes no more.
 
 mod outlet;
@@ -16,9 +17,11 @@ use pita_protocol::message::{Description, Event, EventMessage, InputAck, Role, S
 
 use crate::answers::{Asker, Work};
 use crate::boarding::{Boarding, Ledger, Out};
+use crate::crowd::Crowd;
 use crate::description;
 use crate::frame::Frame;
 use crate::metrics::Traffic;
+use crate::selection::Selection;
 use crate::sessions::{Change, EndReason, SessionId};
 use crate::shared::{Phase, Shared};
 use outlet::Outlet;
@@ -31,6 +34,7 @@ struct Feed {
     id: SessionId,
     outlet: Outlet,
     encoder: Encoder,
+    selection: Selection,
 }
 
 /// The thread's state.
@@ -49,6 +53,8 @@ pub struct Publishing {
     snapshot: Snapshot,
     /// The newest frame in steps, once for all sessions.
     state: State,
+    /// And who that is.
+    crowd: Crowd,
     has_said_closing: bool,
 }
 
@@ -68,6 +74,7 @@ impl Publishing {
             asker,
             feeds: BTreeMap::new(),
             state: State::new(Precision::default())?,
+            crowd: Crowd::default(),
             boarding: VecDeque::new(),
             changes: Vec::new(),
             tick: 0,
@@ -102,7 +109,7 @@ impl Publishing {
             self.shared.sessions().take_changes(&mut changes);
             for change in changes.drain(..) {
                 match change {
-                    Change::Began { id, role, name } => self.begin_session(id, role, name),
+                    Change::Began { id, role, name, bytes_per_s } => self.begin_session(id, role, name, bytes_per_s),
                     Change::Resumed { from, to } => self.resume_session(from, to),
                     Change::Ended { id, role, reason } => self.end_session(id, role, reason),
                 }
@@ -117,9 +124,12 @@ impl Publishing {
         }
     }
 
-    fn begin_session(&mut self, id: SessionId, role: Role, name: String) {
+    fn begin_session(&mut self, id: SessionId, role: Role, name: String, bytes_per_s: u32) {
         match Outlet::for_snapshots(&self.session, self.shared.keys.snapshot(id.slot)) {
-            Ok(outlet) => drop(self.feeds.insert(id.slot, Feed { id, outlet, encoder: Encoder::default() })),
+            Ok(outlet) => {
+                let selection = Selection::new(bytes_per_s, self.shared.tick_hz);
+                self.feeds.insert(id.slot, Feed { id, outlet, encoder: Encoder::default(), selection });
+            }
             Err(reason) => tracing::error!("no publisher for slot {}: {reason}", id.slot),
         }
         tracing::info!("slot {}: {name:?} joins as {role:?}", id.slot);
@@ -227,21 +237,26 @@ impl Publishing {
         if self.feeds.is_empty() {
             return;
         }
-        frame.quantise(&mut self.state);
+        frame.quantise(&mut self.state, &mut self.crowd);
         self.snapshot.tick = frame.tick;
         self.snapshot.event_sequence = self.description.event_sequence;
         for feed in self.feeds.values_mut() {
             let id = feed.id;
             match self.shared.sessions().acknowledged(id) {
                 (0, _) => feed.encoder.restart(),
-                (tick, before) => feed.encoder.acknowledge(tick, before),
+                (tick, before) => {
+                    feed.encoder.acknowledge(tick, before);
+                    feed.selection.acknowledge(tick);
+                }
             }
-            self.snapshot.dof = feed.encoder.encode(frame.tick, &self.state, &[]);
+            let chosen = feed.selection.choose(&feed.encoder, frame.tick, &self.state, &self.crowd, id.slot);
+            self.snapshot.dof = feed.encoder.encode(frame.tick, &self.state, chosen);
             // Acknowledgements are in order of slot.
             let found = frame.acks.binary_search_by_key(&id.slot, |(acked, _)| acked.slot).map(|at| frame.acks[at]);
             self.snapshot.ack = found.ok().filter(|(acked, _)| *acked == id).map(|(_, ack)| ack).unwrap_or_default();
             self.snapshot.epoch = id.epoch;
             let bytes = pita_protocol::encode(&self.snapshot);
+            feed.selection.sent(bytes.len(), &feed.encoder);
             self.shared.counters.sent_bytes.add(bytes.len() as u64);
             feed.outlet.put(bytes);
         }

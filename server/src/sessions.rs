@@ -11,6 +11,8 @@
 use pita_protocol::message::{InputFrame, InputPacket, ResumeProof, Role};
 use pita_protocol::seal::{self, SessionKey};
 
+use crate::selection::LEAST_BYTES_PER_S;
+
 /// Limits of the state machine. Both kinds of slots together are at most `u16::MAX`.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
@@ -24,6 +26,19 @@ pub struct Limits {
     pub resume_grace_ms: u64,
     /// Inputs that are looked at between two ticks; a packet without a new one counts as one.
     pub inputs_per_tick: u32,
+    /// Byte budget of a session that wishes for none, and the highest that one can wish for.
+    pub bytes_per_s: u32,
+}
+
+/// What a client wants to be.
+#[derive(Clone, Copy, Debug)]
+pub struct Wish<'a> {
+    /// To be shown.
+    pub name: &'a str,
+    /// Player or spectator.
+    pub role: Role,
+    /// Byte budget; `None` for what the server gives.
+    pub bytes_per_s: Option<u32>,
 }
 
 /// One session, named for good: a slot is used again, a pair of slot and epoch is not, as far as chance goes.
@@ -85,6 +100,8 @@ pub enum Change {
         role: Role,
         /// Its name.
         name: String,
+        /// Its byte budget.
+        bytes_per_s: u32,
     },
     /// A player's session goes on under another id.
     Resumed {
@@ -183,7 +200,8 @@ impl Sessions {
     ///
     /// # Errors
     /// [`JoinRefusal`].
-    pub fn join(&mut self, name: &str, role: Role, secrets: Secrets, now_ms: u64) -> Result<SessionId, JoinRefusal> {
+    pub fn join(&mut self, wish: Wish<'_>, secrets: Secrets, now_ms: u64) -> Result<SessionId, JoinRefusal> {
+        let Wish { name, role, .. } = wish;
         if self.closing {
             return Err(JoinRefusal::Closing);
         }
@@ -213,8 +231,15 @@ impl Sessions {
             inputs: 0,
             acknowledged: (0, 0),
         });
-        self.changes.push(Change::Began { id, role, name: name.to_owned() });
+        let bytes_per_s = self.bytes_per_s(wish.bytes_per_s);
+        self.changes.push(Change::Began { id, role, name: name.to_owned(), bytes_per_s });
         Ok(id)
+    }
+
+    /// The byte budget of a session that wishes for `wish`.
+    pub fn bytes_per_s(&self, wish: Option<u32>) -> u32 {
+        let most = self.limits.bytes_per_s;
+        wish.map_or(most, |wish| wish.clamp(LEAST_BYTES_PER_S.min(most), most))
     }
 
     /// Lets a player's session go on that `proof` is for, whether its connection is known to be lost or not.

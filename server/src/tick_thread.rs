@@ -170,7 +170,7 @@ impl Ports for Outside {
         match &mut self.frame {
             Some(frame) => {
                 frame.tick = self.record.tick;
-                frame.copy_state(arena.world(), arena.actors());
+                frame.copy_state(arena.world(), arena.relevant_actors());
                 self.drivers.acks(&mut frame.acks);
                 frame.input_waits_us.extend_from_slice(self.drivers.waits_us());
             }

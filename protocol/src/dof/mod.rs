@@ -13,6 +13,7 @@
 //!
 //! Kinds of bodies, by [`Body::kind`], are the [`kind`]s below. Whatever the kind, a body is a row of [`Group`]s.
 
+mod budget;
 mod cells;
 mod frame;
 #[cfg(test)]
@@ -30,6 +31,7 @@ mod stream;
 mod tests;
 mod walk;
 
+pub use budget::{Budget, Cost, Need, Spent};
 pub use cells::{Cadence, CellEncoder};
 pub use frame::{BODIES_MAX, BODY_GROUPS_MAX, Body, Frame, GROUPS_MAX, State};
 pub use predict::GroupState;

@@ -89,6 +89,17 @@ impl GroupState {
         self.fitted
     }
 
+    /// Whether the receiver would leave it where it is, for as long as predictions go.
+    pub fn is_settled(&self, precision: &Precision) -> bool {
+        let half_a_step = match self.value.group {
+            Group::Rotation => (1i64 << RADIANS) / i64::from(precision.rotation),
+            _ => 1 << (FRACTION - 1),
+        };
+        let shift = if self.value.group == Group::Rotation { OFFSET_SHIFT } else { 0 };
+        let mut tracks = self.offset.iter().zip(self.rate);
+        tracks.all(|(&offset, rate)| ((i64::from(offset) << shift) + i64::from(rate) * AHEAD_MAX).abs() < half_a_step)
+    }
+
     fn best(&self) -> usize {
         let [track, last_move, rest] = self.errors;
         if rest < track.min(last_move) {

@@ -1,7 +1,5 @@
 //! Who is sent when not everybody fits: priorities that add up until a body's turn comes.
 
-use std::collections::BTreeMap;
-
 /// What a body's weight is made of. All of it is the sender's choice; receivers know nothing of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relevance {
@@ -31,28 +29,35 @@ impl Relevance {
 /// Priorities of one receiver.
 #[derive(Clone, Debug, Default)]
 pub struct Priorities {
-    waiting: BTreeMap<u32, f32>,
+    /// In order of id.
+    waiting: Vec<(u32, f32)>,
+    /// Kept for its memory.
+    before: Vec<(u32, f32)>,
 }
 
 impl Priorities {
-    /// A tick went by for the body `id`.
-    pub fn wait(&mut self, id: u32, relevance: &Relevance) {
-        *self.waiting.entry(id).or_default() += relevance.weight();
+    /// A tick went by for `all`, in order of id; others are forgotten.
+    pub fn wait(&mut self, all: impl Iterator<Item = (u32, Relevance)>) {
+        std::mem::swap(&mut self.waiting, &mut self.before);
+        self.waiting.clear();
+        let mut before = self.before.iter().peekable();
+        for (id, relevance) in all {
+            while before.next_if(|(other, _)| *other < id).is_some() {}
+            let waited = before.next_if(|(other, _)| *other == id).map_or(0.0, |(_, waited)| *waited);
+            self.waiting.push((id, waited + relevance.weight()));
+        }
     }
 
-    /// The priority of the body `id`.
-    pub fn of(&self, id: u32) -> f32 {
-        self.waiting.get(&id).copied().unwrap_or(0.0)
+    /// Priorities of those that [`Priorities::wait`] named, in its order.
+    pub fn all(&self) -> impl ExactSizeIterator<Item = (u32, f32)> {
+        self.waiting.iter().copied()
     }
 
-    /// The body `id` was sent: it waits anew.
-    pub fn sent(&mut self, id: u32) {
-        self.waiting.insert(id, 0.0);
-    }
-
-    /// Forgets all bodies but those that `keep` names.
-    pub fn retain(&mut self, keep: impl Fn(u32) -> bool) {
-        self.waiting.retain(|&id, _| keep(id));
+    /// Who is at `index` was sent: it waits anew.
+    pub fn sent(&mut self, index: usize) {
+        if let Some((_, waited)) = self.waiting.get_mut(index) {
+            *waited = 0.0;
+        }
     }
 }
 
@@ -66,11 +71,10 @@ mod tests {
         let bodies = [relevance(0.0, 10.0), relevance(100.0, 10.0), relevance(100.0, 0.0)];
         let (mut priorities, mut turns) = (Priorities::default(), [0; 3]);
         for _ in 0..1000 {
-            for (body, id) in bodies.iter().zip(0..) {
-                priorities.wait(id, body);
-            }
-            let next = (0..3).max_by(|&a, &b| priorities.of(a).total_cmp(&priorities.of(b))).unwrap();
-            turns[next as usize] += 1;
+            priorities.wait((0..).zip(bodies));
+            let of: Vec<_> = priorities.all().map(|(_, priority)| priority).collect();
+            let next = (0..3).max_by(|&a, &b| of[a].total_cmp(&of[b])).unwrap();
+            turns[next] += 1;
             priorities.sent(next);
         }
         assert!(turns[0] > turns[1] && turns[1] > turns[2] && turns[2] > 10, "{turns:?}");

@@ -21,6 +21,11 @@ pub trait Coder {
         false
     }
 
+    /// Bytes that an encoder has written, but for those that later bits may still change.
+    fn written(&self) -> usize {
+        0
+    }
+
     /// Codes the low `count` bits of `value`, at most 32, highest first, each as likely as not.
     fn raw(&mut self, value: u32, count: u32) -> u32 {
         (0..count).rev().fold(0, |read, i| read << 1 | u32::from(self.bit(value >> i & 1 == 1, 1 << 15)))
@@ -81,6 +86,10 @@ impl Coder for Encoder<'_> {
             self.hi = self.hi << 8 | 0xff;
         }
         bit
+    }
+
+    fn written(&self) -> usize {
+        self.out.len() - self.start
     }
 }
 

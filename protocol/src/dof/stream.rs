@@ -13,8 +13,10 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use super::budget::{Need, Spent};
 use super::frame::{Frame, State};
-use super::quantise::Precision;
+use super::predict::GroupState;
+use super::quantise::{Precision, Quantised};
 use super::range_coder::{self, Coder};
 use super::walk::{Source, Walk};
 use crate::{WireError, codec::require};
@@ -35,6 +37,7 @@ const PARTIAL: u8 = 4;
 pub struct Encoder {
     /// Oldest first, each with whether the receiver is known to have it.
     sent: VecDeque<(Frame, bool)>,
+    spent: Spent,
 }
 
 impl Encoder {
@@ -65,9 +68,9 @@ impl Encoder {
     /// Where `tick` is not newer than all before.
     pub fn encode(&mut self, tick: u64, state: &State, chosen: &[bool]) -> Vec<u8> {
         assert!(self.sent.back().is_none_or(|(last, _)| last.tick < tick), "ticks ascend");
-        let mut known = self.sent.iter().rev().filter(|(frame, has)| *has && tick - frame.tick <= AGE_MAX);
-        let (base, earlier) = (known.next().map(|(frame, _)| frame), known.next().map(|(frame, _)| frame));
-        let (bytes, next) = encode_against(base, earlier, tick, Source { state, chosen });
+        let (base, earlier) = self.baselines(tick);
+        let (bytes, next, spent) = encode_against(base, earlier, tick, Source { state, chosen });
+        self.spent = spent;
         if self.sent.len() == HISTORY {
             self.sent.pop_front();
         }
@@ -75,32 +78,32 @@ impl Encoder {
         bytes
     }
 
-    /// Codes the snapshot of `tick` into about `budget` bytes: bodies with the highest `priority` first, those that are
-    /// left out keep the state that they had. Answers which bodies of the state were carried, too.
-    ///
-    /// # Panics
-    /// As [`Self::encode`].
-    pub fn encode_within(
-        &mut self,
-        tick: u64,
-        state: &State,
-        budget: usize,
-        priority: impl Fn(u32) -> f32,
-    ) -> (Vec<u8>, Vec<bool>) {
-        let mut order: Vec<_> = state.bodies().iter().enumerate().map(|(i, b)| (priority(b.id), i)).collect();
-        order.sort_by(|(a, i), (b, j)| b.total_cmp(a).then(i.cmp(j)));
-        let mut count = order.len();
-        loop {
-            let mut chosen = vec![count == order.len(); order.len()];
-            order.iter().take(count).for_each(|&(_, i)| chosen[i] = true);
-            let bytes = self.encode(tick, state, &chosen);
-            if bytes.len() <= budget || count == 0 {
-                return (bytes, chosen);
-            }
-            self.forget_last();
-            // In proportion, and a little less, so that a few rounds suffice.
-            count = (count * budget * 9 / (bytes.len() * 10)).min(count - 1);
+    /// What each body of `state` has to tell the receiver that the snapshot of `tick` is coded for, in their order.
+    pub fn needs(&self, tick: u64, state: &State, into: &mut Vec<Need>) {
+        into.clear();
+        let base = self.baselines(tick).0;
+        let mut known = base.map_or(&[][..], |base| &base.bodies).iter().peekable();
+        for body in state.bodies() {
+            while known.next_if(|known| known.id < body.id).is_some() {}
+            let had = known.peek().filter(|known| known.id == body.id).zip(base);
+            into.push(match had {
+                Some((known, base)) if known.groups == body.groups && known.kind == body.kind => {
+                    need(base.groups(known), state.groups(body), state.precision())
+                }
+                _ => Need::First { groups: body.groups },
+            });
         }
+    }
+
+    /// What the snapshot that was coded last took.
+    pub fn spent(&self) -> &Spent {
+        &self.spent
+    }
+
+    /// The newest frame that the receiver has, and the one before.
+    fn baselines(&self, tick: u64) -> (Option<&Frame>, Option<&Frame>) {
+        let mut known = self.sent.iter().rev().filter(|(frame, has)| *has && tick - frame.tick <= AGE_MAX);
+        (known.next().map(|(frame, _)| frame), known.next().map(|(frame, _)| frame))
     }
 
     /// Forgets the snapshot that was coded last: it is not sent, or nothing will build on it.
@@ -114,8 +117,19 @@ impl Encoder {
     }
 }
 
-/// The snapshot of `tick` as bytes, and the frame that a receiver has after it.
-fn encode_against(base: Option<&Frame>, earlier: Option<&Frame>, tick: u64, source: Source<'_>) -> (Vec<u8>, Frame) {
+/// What a body whose groups a receiver has as `had` has to tell it.
+fn need(had: &[GroupState], now: &[Quantised], precision: &Precision) -> Need {
+    let changed = had.iter().zip(now).filter(|(had, now)| had.value != **now || !had.is_settled(precision)).count();
+    if changed == 0 { Need::Nothing } else { Need::Update { groups: changed as u16 } }
+}
+
+/// The snapshot of `tick` as bytes, the frame that a receiver has after it, and what bodies took of the bytes.
+fn encode_against(
+    base: Option<&Frame>,
+    earlier: Option<&Frame>,
+    tick: u64,
+    source: Source<'_>,
+) -> (Vec<u8>, Frame, Spent) {
     let partial = source.chosen.iter().any(|carried| !carried);
     let mut bytes = vec![u8::from(partial) * PARTIAL];
     if let Some(base) = base {
@@ -142,12 +156,13 @@ fn encode_against(base: Option<&Frame>, earlier: Option<&Frame>, tick: u64, sour
     let mut next = successor(base, tick);
     let mut coder = range_coder::Encoder::new(&mut bytes);
     let earlier = earlier.map(|(earlier, _)| earlier);
-    let walk = Walk { coder: &mut coder, base, earlier, partial, source: Some(source) };
+    let mut spent = Spent::default();
+    let walk = Walk { coder: &mut coder, base, earlier, partial, source: Some(source), spent: &mut spent };
     // Every error of a walk is about something that a state cannot be.
     walk.run(&mut next).expect("a state that was checked when it was made");
     coder.finish();
     bytes[check_at..check_at + 2].copy_from_slice(&next.check().to_le_bytes());
-    (bytes, next)
+    (bytes, next, spent)
 }
 
 /// Reads a stream.
@@ -196,7 +211,8 @@ impl Decoder {
         let mut next = successor(base, tick);
         let mut coder = range_coder::Decoder::new(header.bytes);
         let partial = flags & PARTIAL != 0;
-        Walk { coder: &mut coder, base, earlier, partial, source: None }.run(&mut next)?;
+        let spent = &mut Spent::default();
+        Walk { coder: &mut coder, base, earlier, partial, source: None, spent }.run(&mut next)?;
         if coder.is_exhausted() || next.check() != check {
             return Err(WireError::Desync);
         }

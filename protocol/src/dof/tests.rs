@@ -180,23 +180,29 @@ fn bodies_that_are_left_out_keep_their_older_state_until_they_are_sent() {
 }
 
 #[test]
-fn a_budget_is_kept_and_all_bodies_arrive_in_the_end() {
-    let mut toys = Toys::new(21, 2000);
-    let (mut encoder, mut decoder) = (Encoder::default(), Decoder::default());
-    let mut priorities = Priorities::default();
-    for tick in 1..200 {
-        toys.step();
-        let state = toys.state();
-        for body in state.bodies() {
-            priorities.wait(body.id, &Relevance { distance: 10.0, speed: 1.0, is_own: false, importance: 1.0 });
+fn an_encoder_knows_what_a_receiver_lacks() {
+    let (mut encoder, mut needs) = (Encoder::default(), Vec::new());
+    let state = |x: f64, bodies: u32| {
+        let mut state = State::new(Precision::default()).unwrap();
+        for id in 0..bodies {
+            let q = [f64::from(id) + if id == 1 { x } else { 0.0 }, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+            state.push(id, kind::RIGID_BODY, None, &[Group::Point, Group::Rotation], &q).unwrap();
         }
-        let (snapshot, chosen) = encoder.encode_within(tick, &state, 600, |id| priorities.of(id));
-        assert!(snapshot.len() <= 600, "{} bytes", snapshot.len());
-        state.bodies().iter().zip(&chosen).filter(|(_, sent)| **sent).for_each(|(body, _)| priorities.sent(body.id));
-        decoder.decode(tick, &snapshot).unwrap();
-        encoder.acknowledge(tick, u32::MAX);
+        state
+    };
+    encoder.needs(1, &state(0.0, 2), &mut needs);
+    assert_eq!(needs, [Need::First { groups: 2 }; 2]);
+    for tick in 1..4 {
+        encoder.encode(tick, &state(0.0, 2), &[]);
+        encoder.acknowledge(tick, 0);
     }
-    assert_eq!(decoder.newest().unwrap().bodies().len(), 2000);
+    assert_eq!(encoder.spent().first.groups, 0);
+    encoder.needs(4, &state(0.5, 3), &mut needs);
+    assert_eq!(needs, [Need::Nothing, Need::Update { groups: 1 }, Need::First { groups: 2 }]);
+    encoder.encode(4, &state(0.5, 3), &[true, false, true]);
+    let spent = *encoder.spent();
+    assert_eq!((spent.first.groups, spent.updates.groups), (2, 0));
+    assert!((2..20).contains(&spent.first.bytes), "{spent:?}");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! One snapshot's coded part: the walk over all bodies that both sides make alike.
 
+use super::budget::Spent;
 use super::frame::{BODIES_MAX, BODY_GROUPS_MAX, Body, Frame, GROUPS_MAX, State};
 use super::predict::GroupState;
 use super::quantise::{Group, Precision, Quantised};
@@ -52,6 +53,8 @@ pub struct Walk<'a, C> {
     pub partial: bool,
     /// What is coded; `None` when decoding.
     pub source: Option<Source<'a>>,
+    /// What an encoder's bodies took.
+    pub spent: &'a mut Spent,
 }
 
 impl<C: Coder> Walk<'_, C> {
@@ -158,7 +161,7 @@ impl<C: Coder> Walk<'_, C> {
         require(next.groups.len() + added.layout.len() <= GROUPS_MAX, "groups", "at most 65536")?;
         require(!self.coder.is_exhausted(), "coded data", "longer")?;
         let source = self.source.and_then(|s| Some(s.state.groups(s.state.find(added.id)?)));
-        let start = next.groups.len();
+        let (start, written) = (next.groups.len(), self.coder.written());
         // Points are likely to be near the last point of this body, the first one near the first of the body before.
         let mut before = next.bodies.last().map(|body| next.groups[body.start as usize].value);
         for (i, &group) in added.layout.iter().enumerate() {
@@ -169,6 +172,7 @@ impl<C: Coder> Walk<'_, C> {
             next.groups.push(GroupState::first(value));
             before = if group == Group::Point { Some(value) } else { before };
         }
+        self.spent.first.add(added.layout.len(), self.coder.written() - written);
         let groups = added.layout.len() as u16;
         next.bodies.push(Body { id: added.id, kind: added.kind, parent: added.parent, start: start as u32, groups });
         next.ticks.push(next.tick);
@@ -196,7 +200,7 @@ impl<C: Coder> Walk<'_, C> {
         let ahead = next.tick.saturating_sub(tick) as i64;
         let earlier = self.earlier.and_then(|earlier| earlier_of(earlier, index, &body, tick));
         let mut around = Surroundings { sibling: None, neighbour: *neighbour };
-        let mut moved = 0;
+        let (mut moved, mut changed, written) = (0, 0, self.coder.written());
         for (i, base) in old.iter().enumerate() {
             let before = earlier.map(|(groups, span)| (&groups[i].value, span));
             let prediction = base.predict(ahead, before, &next.precision);
@@ -205,7 +209,9 @@ impl<C: Coder> Walk<'_, C> {
             next.groups.push(prediction.update(base, value, &next.precision));
             around.sibling = Some(size);
             moved += size;
+            changed += usize::from(value != base.value);
         }
+        self.spent.updates.add(changed, self.coder.written() - written);
         next.ticks.push(next.tick);
         *neighbour = moved;
         Ok(())

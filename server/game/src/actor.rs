@@ -111,6 +111,12 @@ pub trait Actor: Send {
     /// Remembers what [`Actor::memory`] answered then.
     fn recall(&mut self, _memory: &Memory) {}
 
+    /// How much it matters to those who watch, where not everybody can be sent in every tick: 1 is the rule, 2 counts as
+    /// half as far away, 0 is never sent. Distance, speed and ownership come on top.
+    fn relevance(&self) -> f32 {
+        1.0
+    }
+
     /// Input mapping, stage 1: the newest controls of the player whose slot it has.
     fn control(&mut self, _controls: Controls) {}
 

@@ -177,6 +177,11 @@ impl Arena {
         self.actors.values().map(|actor| actor.describe())
     }
 
+    /// The same, each with how much it [matters](Actor::relevance).
+    pub fn relevant_actors(&self) -> impl Iterator<Item = (&ActorInfo, f32)> {
+        self.actors.values().map(|actor| (actor.describe(), actor.relevance()))
+    }
+
     /// The actor of a slot.
     pub fn actor_of(&self, slot: u16) -> Option<&ActorInfo> {
         self.slots.get(&slot).and_then(|id| self.actors.get(id)).map(|actor| actor.describe())

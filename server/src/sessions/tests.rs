@@ -2,13 +2,20 @@ use super::*;
 use pita_protocol::message::Controls;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-const LIMITS: Limits =
-    Limits { players: 2, spectators: 1, input_timeout_ms: 5000, resume_grace_ms: 0, inputs_per_tick: 4 };
+const LIMITS: Limits = Limits {
+    players: 2,
+    spectators: 1,
+    input_timeout_ms: 5000,
+    resume_grace_ms: 0,
+    inputs_per_tick: 4,
+    bytes_per_s: 64_000,
+};
 
 fn join(sessions: &mut Sessions, role: Role, now_ms: u64) -> Result<SessionId, JoinRefusal> {
     static EPOCHS: AtomicU32 = AtomicU32::new(1);
     let secrets = secrets(EPOCHS.fetch_add(1, Ordering::Relaxed));
-    sessions.join(&format!("Wu {}", secrets.epoch), role, secrets, now_ms)
+    let name = &format!("Wu {}", secrets.epoch);
+    sessions.join(Wish { name, role, bytes_per_s: None }, secrets, now_ms)
 }
 
 fn secrets(epoch: u32) -> Secrets {
@@ -134,7 +141,8 @@ fn nobody_joins_a_closing_server() {
 #[test]
 fn names_are_taken_once_and_banned_ones_never() {
     let mut sessions = Sessions::new(LIMITS, &["Mallory".to_owned()]);
-    let mut join = |name: &str, epoch| sessions.join(name, Role::Player, secrets(epoch), 0);
+    let mut join =
+        |name: &str, epoch| sessions.join(Wish { name, role: Role::Player, bytes_per_s: None }, secrets(epoch), 0);
     assert!(join("Wu", 1).is_ok());
     assert_eq!(join(" wU ", 2), Err(JoinRefusal::NameTaken));
     assert_eq!(join("mallorY", 3), Err(JoinRefusal::Banned));

@@ -6,7 +6,7 @@ use glam::{DMat3, DQuat, DVec3};
 use pita_client::{part_pose, part_vertices};
 use pita_game::{ActorInfo, PartInfo};
 use pita_protocol::dof::{Decoder, Encoder, Precision, State, kind};
-use pita_server::{description, frame::Frame};
+use pita_server::{crowd::Crowd, description, frame::Frame};
 use pita_sim::mass::{Density, Polyhedron};
 use pita_sim::mesh::TetrahedralMesh;
 use pita_sim::potential::elasticity::Elastic;
@@ -161,7 +161,7 @@ fn clients_show_parts_of_every_kind_where_the_engine_has_them() {
         let mut frame = Frame::default();
         // As actors of their own: bodies are not attached to each other.
         frame.copy_state(&zoo.world, std::iter::empty());
-        frame.quantise(&mut state);
+        frame.quantise(&mut state, &mut Crowd::default());
         let bytes = encoder.encode(tick, &state, &[]);
         let slices = decoder.decode(tick, &bytes).unwrap().slices(TICK_HZ);
         encoder.acknowledge(tick, 0);
