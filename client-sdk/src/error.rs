@@ -2,7 +2,10 @@
 
 use std::time::Duration;
 
-use pita_protocol::{WireError, message::Refusal};
+use pita_protocol::{
+    WireError,
+    message::{Refusal, SayRefusal},
+};
 
 /// Why something that was asked of this library did not happen; the text says what to do about it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -62,6 +65,9 @@ pub enum ClientError {
     /// The caller passed a value that the protocol does not allow.
     #[error("{0}")]
     BadArgument(WireError),
+    /// The server did not pass a text on.
+    #[error("nobody was told: {0}")]
+    NotSaid(SayRefusal),
     /// A spectator drives nothing.
     #[error("a spectator drives nothing: connect as a player to send controls")]
     Spectator,

@@ -307,6 +307,8 @@ mod tests {
             tick,
             event_sequence: 0,
             gravity: [0.0; 3],
+            precision: Precision::default(),
+            scores: Vec::new(),
             statics: Vec::new(),
             actors: Vec::new(),
         };

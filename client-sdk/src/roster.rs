@@ -15,6 +15,8 @@ pub const ACTORS_MAX: usize = 65_536;
 #[derive(Clone, Debug)]
 pub struct Roster {
     actors: BTreeMap<u32, Arc<ActorDescription>>,
+    /// Points of this round, by actor.
+    scores: BTreeMap<u32, u32>,
     event_sequence: u32,
     /// Events that did not arrive since the last description.
     missing: u32,
@@ -37,6 +39,7 @@ impl Roster {
         let known = description.actors.iter().take(ACTORS_MAX);
         Self {
             actors: known.map(|actor| (actor.id, Arc::new(actor.clone()))).collect(),
+            scores: description.scores.iter().copied().take(ACTORS_MAX).collect(),
             event_sequence: description.event_sequence,
             missing: 0,
             announced: description.event_sequence,
@@ -51,6 +54,11 @@ impl Roster {
     /// The actor of this id.
     pub fn actor(&self, id: u32) -> Option<&Arc<ActorDescription>> {
         self.actors.get(&id)
+    }
+
+    /// Points of an actor in this round.
+    pub fn points(&self, id: u32) -> u32 {
+        self.scores.get(&id).copied().unwrap_or(0)
     }
 
     /// Slice that says where the actor is: the one of its first part.
@@ -87,7 +95,12 @@ impl Roster {
             }
             Event::ActorRemoved { id } => {
                 self.actors.remove(id);
+                self.scores.remove(id);
             }
+            Event::Scored { actor, points } if self.scores.len() < ACTORS_MAX => {
+                self.scores.insert(*actor, *points);
+            }
+            Event::RoundBegan { .. } => self.scores.clear(),
             _ => {}
         }
         true
@@ -112,6 +125,7 @@ impl Roster {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pita_protocol::dof::Precision;
 
     fn actor(id: u32) -> ActorDescription {
         ActorDescription { id, kind: "vehicle".into(), name: format!("car {id}"), slot: None, parts: Vec::new() }
@@ -124,6 +138,8 @@ mod tests {
             tick: 0,
             event_sequence,
             gravity: [0.0; 3],
+            precision: Precision::default(),
+            scores: Vec::new(),
             statics: Vec::new(),
             actors: ids.iter().map(|&id| actor(id)).collect(),
         }
@@ -161,6 +177,16 @@ mod tests {
         let changes = vec![Event::ActorRemoved { id: 1 }, Event::ActorAdded(actor(5))];
         assert_eq!(roster.reconcile(&description(5, &[5, 9])), Some(Reconciled { missed: 3, changes }));
         assert_eq!((ids(&roster), roster.is_behind()), (vec![5, 9], false));
+    }
+
+    #[test]
+    fn points_are_of_this_round() {
+        let mut roster = Roster::new(&Description { scores: vec![(1, 3)], ..description(1, &[1, 2]) });
+        let scored = Event::Scored { actor: 2, points: 5 };
+        assert!(roster.apply(&event(2, scored)));
+        assert_eq!((roster.points(1), roster.points(2)), (3, 5));
+        assert!(roster.apply(&event(3, Event::RoundBegan { number: 2 })));
+        assert_eq!((roster.points(1), roster.points(2)), (0, 0));
     }
 
     #[test]

@@ -136,6 +136,19 @@ impl Session {
         self.wire.send(controls, false).await
     }
 
+    /// Says `text`, 1 to 200 bytes, to everybody: it comes to them, and back to this session, as
+    /// [`Event::Said`](crate::Event::Said). Reliable, unlike snapshots.
+    ///
+    /// # Errors
+    /// [`ClientError::NotSaid`] where it was too much of late, or nothing to read; [`ClientError::BadArgument`] for its
+    /// length, [`ClientError::Ended`], [`ClientError::Transport`].
+    pub async fn say(&self, text: &str) -> Result<(), ClientError> {
+        match self.end() {
+            Some(end) => Err(end.into()),
+            None => self.wire.say(text).await,
+        }
+    }
+
     /// The newest snapshot, if one has arrived.
     pub fn latest_snapshot(&self) -> Option<Arc<ReceivedSnapshot>> {
         self.shared.newest()

@@ -1,13 +1,16 @@
 //! Sending side of a session: seals and puts input packets.
 
 use std::{
-    sync::{Arc, Mutex},
-    time::Instant,
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicU32, Ordering},
+    },
+    time::{Duration, Instant},
 };
 
 use pita_protocol::{
-    Keys,
-    message::{Controls, JoinAccepted},
+    Keys, Message,
+    message::{Controls, JoinAccepted, SayReply, SayRequest},
     seal::{SessionKey, seal},
 };
 use zenoh::{
@@ -22,9 +25,13 @@ use crate::{
     lock::lock,
     outbox::Outbox,
     shared::Shared,
+    transport,
 };
 
-/// Sends the inputs of one session.
+/// How long the answer to something that was said is waited for.
+const SAY_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Sends the inputs of one session, and what it says.
 #[derive(Debug)]
 pub struct Wire {
     publisher: Arc<Publisher<'static>>,
@@ -33,6 +40,16 @@ pub struct Wire {
     session_key: SessionKey,
     outbox: Mutex<Outbox>,
     shared: Arc<Shared>,
+    say: Say,
+}
+
+/// What chat needs.
+#[derive(Debug)]
+struct Say {
+    zenoh: zenoh::Session,
+    key_expr: String,
+    epoch: u32,
+    sequence: AtomicU32,
 }
 
 impl Wire {
@@ -60,7 +77,27 @@ impl Wire {
             let put = move |bytes: Vec<u8>| drop(publisher.put(bytes).wait());
             Link::new(settings.up, Delivery::Datagrams, settings.seed.rotate_left(32), put)
         });
-        Ok(Self { publisher, conditioner, key_expr, session_key: accepted.session_key.clone(), outbox, shared })
+        let say = Say {
+            zenoh: zenoh.clone(),
+            key_expr: keys.say(accepted.slot),
+            epoch: accepted.epoch,
+            sequence: AtomicU32::new(1),
+        };
+        Ok(Self { publisher, conditioner, key_expr, session_key: accepted.session_key.clone(), outbox, shared, say })
+    }
+
+    /// Says `text` to everybody.
+    pub async fn say(&self, text: &str) -> Result<(), ClientError> {
+        let Say { zenoh, key_expr, epoch, sequence } = &self.say;
+        let sequence = sequence.fetch_add(1, Ordering::Relaxed);
+        let request = SayRequest { epoch: *epoch, sequence, text: text.to_owned() };
+        request.validate().map_err(ClientError::BadArgument)?;
+        let sealed = seal(&request, &self.session_key, key_expr);
+        match transport::ask(zenoh, key_expr, "say", sealed, SAY_TIMEOUT).await? {
+            Some(SayReply::Said) => Ok(()),
+            Some(SayReply::Refused(refusal)) => Err(ClientError::NotSaid(refusal)),
+            None => Err(ClientError::Transport { action: "say anything", reason: "the server does not answer".into() }),
+        }
     }
 
     /// Sends `controls` for the first tick that they can reach; answers their sequence number.

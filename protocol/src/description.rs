@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::codec::{Message, WireError, require};
+use crate::dof::Precision;
 use crate::message::TEXT_MAX;
 
 /// Most points of a convex hull.
@@ -30,6 +31,10 @@ pub struct Description {
     pub event_sequence: u32,
     /// Acceleration, m/s².
     pub gravity: [f32; 3],
+    /// How fine the numbers of snapshots are.
+    pub precision: Precision,
+    /// Points of this round, of actors that have any, in order of id.
+    pub scores: Vec<(u32, u32)>,
     /// Geometry that never moves.
     pub statics: Vec<StaticDescription>,
     /// Everything that has game logic, in order of id.
@@ -237,6 +242,7 @@ impl Message for Description {
     fn validate(&self) -> Result<(), WireError> {
         let poses = self.statics.iter().all(|s| all_finite(&s.position) && all_finite(&s.rotation));
         require(poses && all_finite(&self.gravity), "description numbers", "finite")?;
+        self.precision.check()?;
         self.statics.iter().try_for_each(|piece| piece.shape.validate())?;
         self.actors.iter().try_for_each(ActorDescription::validate)?;
         let is_short = self.arena.len() <= TEXT_MAX && self.title.len() <= TEXT_MAX;

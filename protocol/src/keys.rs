@@ -7,6 +7,7 @@
 //! pita/<arena>/status             query: - -> Status
 //! pita/<arena>/ticks              query: TicksRequest -> TickRecords
 //! pita/<arena>/input/<slot>       put by the client: sealed InputPacket
+//! pita/<arena>/say/<slot>         query: sealed SayRequest -> SayReply
 //! pita/<arena>/snapshot/<slot>    put by the server: Snapshot
 //! pita/<arena>/event              put by the server: EventMessage
 //! pita/<arena>/live/<slot>/<epoch>  liveliness token of a session
@@ -77,6 +78,17 @@ impl Keys {
         self.of("input/*")
     }
 
+    /// Query of the client of `slot`: a sealed [`SayRequest`](crate::message::SayRequest) is answered by
+    /// [`SayReply`](crate::message::SayReply).
+    pub fn say(&self, slot: u16) -> String {
+        self.of(&format!("say/{slot}"))
+    }
+
+    /// All chat, for the server's queryable.
+    pub fn all_says(&self) -> String {
+        self.of("say/*")
+    }
+
     /// Put by the server for the client of `slot`: [`Snapshot`](crate::message::Snapshot).
     pub fn snapshot(&self, slot: u16) -> String {
         self.of(&format!("snapshot/{slot}"))
@@ -105,6 +117,11 @@ impl Keys {
     /// Slot of an input key of this arena.
     pub fn slot_of_input(&self, key: &str) -> Option<u16> {
         self.rest(key)?.strip_prefix("input/")?.parse().ok()
+    }
+
+    /// Slot of a chat key of this arena.
+    pub fn slot_of_say(&self, key: &str) -> Option<u16> {
+        self.rest(key)?.strip_prefix("say/")?.parse().ok()
     }
 
     /// Slot and epoch of a liveliness key of this arena.

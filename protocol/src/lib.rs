@@ -1,12 +1,14 @@
 //! PITA's wire: what travels between the daemon and its clients.
 //!
-//! Owns: key expressions ([`keys`]), messages ([`message`], those of inputs in [`input`], the world in words in [`description`]), their encoding and limits ([`codec`]), authentication of
+//! Owns: key expressions ([`keys`]), messages ([`message`], those of inputs in [`input`], the world in words in [`description`],
+//! what players say in [`chat`]), their encoding and limits ([`codec`]), authentication of
 //! inputs ([`seal`]), and the streams of DOF ([`dof`]). It does no I/O, reads no clock and knows no engine.
 //!
 //! Every byte that is decoded here is untrusted: decoding answers a [`WireError`], never panics, and allocates no more
 //! than the message's own limit.
 
 pub mod build_info;
+pub mod chat;
 pub mod codec;
 pub mod description;
 pub mod dof;
@@ -21,7 +23,7 @@ pub use keys::Keys;
 /// Version of everything this crate encodes; the first field of every message.
 ///
 /// A peer of another version is refused at join with both numbers in the text.
-pub const PROTOCOL_VERSION: u16 = 3;
+pub const PROTOCOL_VERSION: u16 = 4;
 
 /// Where a daemon listens, and where clients look for it, unless told otherwise.
 pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";

@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::chat::{CHAT_MAX, SayRefusal, SayReply, SayRequest};
 use crate::codec::{Message, WireError, require};
 pub use crate::description::{
     ActorDescription, ChainJoint, Description, JointMotion, Mount, MountNode, PartDescription, Shape,
@@ -215,11 +216,61 @@ pub enum Event {
         /// For a person: `left`, `connection lost`, `no input for 5 s`.
         reason: String,
     },
+    /// A player or spectator says something.
+    Said {
+        /// Slot of the session.
+        slot: u16,
+        /// One line, [readable](crate::chat::readable).
+        text: String,
+    },
+    /// Something to see or hear.
+    Effect(Effect),
+    /// An actor is knocked out.
+    KnockedOut {
+        /// Who.
+        actor: u32,
+        /// Whose merit it is.
+        by: Option<u32>,
+    },
+    /// An actor has more points than before.
+    Scored {
+        /// Who.
+        actor: u32,
+        /// In this round.
+        points: u32,
+    },
+    /// A round is over.
+    RoundEnded {
+        /// Counts rounds, from 1.
+        number: u32,
+        /// Who has most points; nobody where nobody has any.
+        winner: Option<u32>,
+    },
+    /// A round begins, nobody having any points.
+    RoundBegan {
+        /// Counts rounds, from 1.
+        number: u32,
+    },
     /// The server ends.
     Closing {
         /// For a person.
         reason: String,
     },
+}
+
+/// Something to see or hear, once.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Effect {
+    /// `dust`, `splinters`, `blast`.
+    pub kind: String,
+    /// The actor that made it.
+    pub actor: u32,
+    /// Where, m.
+    pub position: [f32; 3],
+    /// Which way and how far, m.
+    pub direction: [f32; 3],
+    /// 0 to 1.
+    pub strength: f32,
 }
 
 impl Message for EventMessage {
@@ -231,7 +282,17 @@ impl Message for EventMessage {
             Event::Joined { name: text, .. } | Event::Left { reason: text, .. } | Event::Closing { reason: text } => {
                 require(text.len() <= TEXT_MAX, "text", "at most 256 bytes")
             }
-            Event::ActorRemoved { .. } => Ok(()),
+            Event::Said { text, .. } => require(text.len() <= TEXT_MAX, "text", "at most 256 bytes"),
+            Event::Effect(effect) => {
+                require(effect.kind.len() <= TEXT_MAX, "text", "at most 256 bytes")?;
+                let numbers = effect.position.iter().chain(&effect.direction).chain([&effect.strength]);
+                require(numbers.into_iter().all(|x| x.is_finite()), "effect", "finite")
+            }
+            Event::ActorRemoved { .. }
+            | Event::KnockedOut { .. }
+            | Event::Scored { .. }
+            | Event::RoundEnded { .. }
+            | Event::RoundBegan { .. } => Ok(()),
         }
     }
 }
@@ -337,6 +398,8 @@ pub struct RefusedCounts {
     pub input_flood: u64,
     /// Queries (`status`, `ticks`, `describe`) that could not be read.
     pub query_malformed: u64,
+    /// Chat that was refused: too much of it, not for reading, not authentic.
+    pub say_refused: u64,
 }
 
 impl Message for Status {

@@ -1,8 +1,8 @@
-//! Authentication of inputs: a blake3 keyed hash over key expression and body.
+//! Authentication of what clients send: a blake3 keyed hash over key expression and body.
 //!
 //! ```text
 //! ┌───────────────────────────┬──────────────┐
-//! │ encoded InputPacket       │ tag          │
+//! │ encoded packet            │ tag          │
 //! │ n bytes                   │ 16 bytes     │
 //! └───────────────────────────┴──────────────┘
 //! tag = blake3_keyed(session key, u32 LE length of key expression ‖ key expression ‖ encoded packet)[..16]
@@ -11,7 +11,7 @@
 //! The key expression is covered so that a packet of one slot cannot be replayed on another's. Replays on the same
 //! slot are dropped by the sequence number inside.
 
-use crate::{Message, WireError, decode, encode, message::InputPacket};
+use crate::{Message, WireError, decode, encode};
 
 /// Secret shared by one session and the server, handed out at join.
 #[derive(Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -27,7 +27,7 @@ impl std::fmt::Debug for SessionKey {
 pub const TAG_BYTES: usize = 16;
 
 /// Encodes `packet` for `key_expr` and appends its tag.
-pub fn seal(packet: &InputPacket, key: &SessionKey, key_expr: &str) -> Vec<u8> {
+pub fn seal<M: Message>(packet: &M, key: &SessionKey, key_expr: &str) -> Vec<u8> {
     let mut bytes = encode(packet);
     let tag = tag(&bytes, key, key_expr);
     bytes.extend_from_slice(&tag);
@@ -39,8 +39,8 @@ pub fn seal(packet: &InputPacket, key: &SessionKey, key_expr: &str) -> Vec<u8> {
 /// # Errors
 /// [`WireError::TooLong`] and [`WireError::Malformed`] by length, [`WireError::Forged`] where the tag does not match,
 /// else what [`decode`] says.
-pub fn open(sealed: &[u8], key: &SessionKey, key_expr: &str) -> Result<InputPacket, WireError> {
-    let max = InputPacket::MAX_BYTES + TAG_BYTES;
+pub fn open<M: Message>(sealed: &[u8], key: &SessionKey, key_expr: &str) -> Result<M, WireError> {
+    let max = M::MAX_BYTES + TAG_BYTES;
     if sealed.len() > max {
         return Err(WireError::TooLong { bytes: sealed.len(), max });
     }
@@ -95,6 +95,7 @@ fn same(ours: &[u8; TAG_BYTES], theirs: &[u8; TAG_BYTES]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::message::InputPacket;
     use crate::message::{Controls, InputFrame};
 
     fn packet() -> InputPacket {
@@ -107,15 +108,15 @@ mod tests {
         let key = SessionKey([7; 32]);
         let sealed = seal(&packet(), &key, "pita/a/input/1");
         assert_eq!(open(&sealed, &key, "pita/a/input/1"), Ok(packet()));
-        assert_eq!(open(&sealed, &key, "pita/a/input/2"), Err(WireError::Forged));
-        assert_eq!(open(&sealed, &SessionKey([8; 32]), "pita/a/input/1"), Err(WireError::Forged));
+        assert_eq!(open::<InputPacket>(&sealed, &key, "pita/a/input/2"), Err(WireError::Forged));
+        assert_eq!(open::<InputPacket>(&sealed, &SessionKey([8; 32]), "pita/a/input/1"), Err(WireError::Forged));
         for bit in 0..sealed.len() * 8 {
             let mut flipped = sealed.clone();
             flipped[bit / 8] ^= 1 << (bit % 8);
-            assert_eq!(open(&flipped, &key, "pita/a/input/1"), Err(WireError::Forged), "bit {bit}");
+            assert_eq!(open::<InputPacket>(&flipped, &key, "pita/a/input/1"), Err(WireError::Forged), "bit {bit}");
         }
         for length in 0..sealed.len() {
-            assert!(open(&sealed[..length], &key, "pita/a/input/1").is_err(), "length {length}");
+            assert!(open::<InputPacket>(&sealed[..length], &key, "pita/a/input/1").is_err(), "length {length}");
         }
     }
 

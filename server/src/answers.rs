@@ -9,8 +9,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
 
-use pita_protocol::message::{Description, JoinAccepted, JoinReply, JoinRequest, Refusal, Role, TicksRequest};
-use pita_protocol::seal::SessionKey;
+use pita_protocol::message::{
+    Description, JoinAccepted, JoinReply, JoinRequest, Refusal, Role, SayRefusal, SayReply, SayRequest, TicksRequest,
+};
+use pita_protocol::seal::{self, SessionKey, TAG_BYTES};
 use pita_protocol::{Message, PROTOCOL_VERSION, WireError};
 use zenoh::Wait;
 use zenoh::query::Query;
@@ -27,6 +29,8 @@ const QUERIES_MAX: usize = 256;
 pub enum Question {
     /// A session.
     Join,
+    /// To say something to everybody.
+    Say,
     /// The world.
     Describe,
     /// The arena's file.
@@ -123,6 +127,7 @@ impl Answering {
         shared.counters.received_bytes.add(query.payload().map_or(0, |payload| payload.len()) as u64);
         match question {
             Question::Join => self.join(query),
+            Question::Say => self.say(&query),
             Question::Describe => reply(shared, &query, shared.keys.describe(), &*shared.description()),
             Question::Source => reply(shared, &query, shared.keys.source(), &shared.source),
             Question::Status => reply(shared, &query, shared.keys.status(), &metrics::status(shared)),
@@ -149,6 +154,29 @@ impl Answering {
                 self.refuse(&query, refusal);
             }
         }
+    }
+
+    fn say(&self, query: &Query) {
+        let answer = match self.hear(query) {
+            Ok(()) => SayReply::Said,
+            Err(refusal) => {
+                self.shared.counters.say_refused.add(1);
+                SayReply::Refused(refusal)
+            }
+        };
+        self.shared.wake_publisher();
+        reply(&self.shared, query, query.key_expr().to_string(), &answer);
+    }
+
+    fn hear(&self, query: &Query) -> Result<(), SayRefusal> {
+        let key_expr = query.key_expr().as_str();
+        let slot = self.shared.keys.slot_of_say(key_expr).ok_or(SayRefusal::NotYours)?;
+        let payload = query.payload().filter(|payload| payload.len() <= SayRequest::MAX_BYTES + TAG_BYTES);
+        let sealed = payload.ok_or(SayRefusal::NotYours)?.to_bytes();
+        let mut sessions = self.shared.sessions();
+        let key = sessions.key(slot).ok_or(SayRefusal::NotYours)?;
+        let request: SayRequest = seal::open(&sealed, key, key_expr).map_err(|_| SayRefusal::NotYours)?;
+        sessions.say(slot, &request, self.shared.clock.ms())
     }
 
     /// Says why there is no session, and counts it.

@@ -8,6 +8,7 @@ mod within;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use pita_protocol::dof::Precision;
 use serde::Deserialize;
 
 pub use within::{TickRate, Within};
@@ -28,6 +29,8 @@ pub struct ServerConfig {
     pub arena: ArenaChoice,
     /// Pacing.
     pub tick: Tick,
+    /// How fine the state is sent.
+    pub precision: PrecisionSteps,
     /// Slots and timeouts.
     pub sessions: SessionLimits,
     /// Who stays out.
@@ -86,6 +89,25 @@ pub enum WhenBehind {
     SlowDown,
     /// Ticks missed by a whole period are left out, their numbers with them.
     Skip,
+}
+
+/// `[precision]`
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PrecisionSteps {
+    /// Steps of a metre of positions.
+    pub steps_per_m: Within<10, 65_536>,
+    /// Steps of 1 of quaternion components.
+    pub rotation_steps: Within<64, 8192>,
+    /// Steps of a metre or radian of joint coordinates.
+    pub joint_steps: Within<10, 65_536>,
+}
+
+impl From<PrecisionSteps> for Precision {
+    fn from(steps: PrecisionSteps) -> Self {
+        let (point, rotation) = (steps.steps_per_m.get(), steps.rotation_steps.get());
+        Self { point, rotation, scalar: steps.joint_steps.get(), ..Self::default() }
+    }
 }
 
 /// `[sessions]`
@@ -225,6 +247,12 @@ mod tests {
         let changed = ServerConfig::parse("[tick]\ntick_hz = 25", "my.toml").unwrap();
         assert_eq!(changed.tick.tick_hz.hz(), 25);
         assert_eq!(ServerConfig { tick: built_in.tick, ..changed }, built_in);
+    }
+
+    /// What is compiled in is what the wire takes where nothing is said.
+    #[test]
+    fn the_default_precision_is_the_protocols() {
+        assert_eq!(Precision::from(ServerConfig::built_in().precision), Precision::default());
     }
 
     #[test]

@@ -47,6 +47,7 @@ pub struct Counters {
     pub input_stale: Counter,
     pub input_flood: Counter,
     pub query_malformed: Counter,
+    pub say_refused: Counter,
 }
 
 impl Counters {
@@ -68,6 +69,7 @@ impl Counters {
             input_stale: self.input_stale.get(),
             input_flood: self.input_flood.get(),
             query_malformed: self.query_malformed.get(),
+            say_refused: self.say_refused.get(),
         }
     }
 }

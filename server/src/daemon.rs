@@ -142,7 +142,7 @@ fn run_arena(Configured { config, arena, source }: Configured, clock: Clock, out
 fn share(config: &ServerConfig, arena: &Arena, source: String, clock: Clock) -> Result<Shared, DaemonError> {
     let name_error = |reason| DaemonError::ArenaName { name: arena.name().to_owned(), reason };
     let limits = config.sessions;
-    let description = description::describe(arena);
+    let description = description::describe(arena, config.precision.into());
     description::check(&description).map_err(DaemonError::Undescribable)?;
     // Ranges of the configuration are within u16.
     let players = arena.max_players().min(limits.players_max.get() as u16);

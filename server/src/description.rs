@@ -7,12 +7,13 @@ mod parts;
 
 use pita_game::{ActorInfo, Arena};
 use pita_protocol::Message;
-use pita_protocol::message::{ActorDescription, Description, Event, EventMessage, StaticDescription};
+use pita_protocol::dof::Precision;
+use pita_protocol::message::{ActorDescription, Description, Effect, Event, EventMessage, StaticDescription};
 
 use parts::{parts, quaternion, shapes, vector};
 
-/// `arena` as it is now; the description's events begin at 0.
-pub fn describe(arena: &Arena) -> Description {
+/// `arena` as it is now, its state sent with `precision`; the description's events begin at 0.
+pub fn describe(arena: &Arena, precision: Precision) -> Description {
     let of_static = |info: &pita_game::StaticInfo| {
         let (position, rotation) = (vector(info.position), quaternion(info.rotation));
         shapes(&info.shape).into_iter().map(move |shape| StaticDescription { shape, position, rotation })
@@ -23,6 +24,8 @@ pub fn describe(arena: &Arena) -> Description {
         tick: arena.tick(),
         event_sequence: 0,
         gravity: vector(arena.world().settings().gravity),
+        precision,
+        scores: Vec::new(),
         statics: arena.statics().iter().flat_map(of_static).collect(),
         actors: arena.actors().map(actor).collect(),
     }
@@ -95,8 +98,31 @@ pub fn apply(description: &mut Description, event: &Event, sequence: u32, tick: 
             if let Ok(at) = place(*id) {
                 description.actors.remove(at);
             }
+            description.scores.retain(|(actor, _)| actor != id);
         }
-        Event::Joined { .. } | Event::Left { .. } | Event::Closing { .. } => {}
+        Event::Scored { actor, points } => match description.scores.binary_search_by_key(actor, |(id, _)| *id) {
+            Ok(at) => description.scores[at].1 = *points,
+            Err(at) => description.scores.insert(at, (*actor, *points)),
+        },
+        Event::RoundBegan { .. } => description.scores.clear(),
+        Event::Joined { .. }
+        | Event::Left { .. }
+        | Event::Said { .. }
+        | Event::Effect(_)
+        | Event::KnockedOut { .. }
+        | Event::RoundEnded { .. }
+        | Event::Closing { .. } => {}
+    }
+}
+
+/// An effect in the words of the wire.
+pub fn effect(effect: &pita_game::step::Effect) -> Effect {
+    Effect {
+        kind: effect.kind.to_owned(),
+        actor: effect.actor,
+        position: vector(effect.position),
+        direction: vector(effect.direction),
+        strength: effect.strength as f32,
     }
 }
 
@@ -121,13 +147,20 @@ mod tests {
             tick: 0,
             event_sequence: 0,
             gravity: [0.0; 3],
+            precision: Precision::default(),
+            scores: Vec::new(),
             statics: Vec::new(),
             actors: vec![actor(4, None)],
         };
         apply(&mut description, &Event::ActorAdded(actor(9, Some(3))), 1, 10);
         apply(&mut description, &Event::ActorAdded(actor(7, Some(2))), 2, 11);
         assert_eq!(actor_of(&description, 2), Some(7));
+        for (actor, points) in [(9, 1), (4, 7), (9, 2)] {
+            apply(&mut description, &Event::Scored { actor, points }, 2, 11);
+        }
+        assert_eq!(description.scores, [(4, 7), (9, 2)]);
         apply(&mut description, &Event::ActorRemoved { id: 4 }, 3, 12);
+        assert_eq!(description.scores, [(9, 2)], "they go with the actor");
         apply(&mut description, &Event::ActorRemoved { id: 5 }, 4, 13);
         assert_eq!(description.actors, [actor(7, Some(2)), actor(9, Some(3))]);
         assert_eq!((description.event_sequence, description.tick), (4, 13));

@@ -150,6 +150,7 @@ fn configuration(config: &Network, keys: &Keys, endpoint: &str) -> zenoh::Config
 fn access_rules(keys: &Keys) -> serde_json::Value {
     let questions = [
         keys.join(),
+        keys.all_says(),
         keys.describe(),
         keys.source(),
         keys.status(),

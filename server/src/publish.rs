@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use pita_game::ArenaEvent;
-use pita_protocol::dof::{Encoder, Precision, State};
+use pita_protocol::dof::{Encoder, State};
 use pita_protocol::message::{Description, Event, EventMessage, InputAck, Role, Snapshot};
 
 use crate::answers::{Asker, Work};
@@ -69,11 +69,11 @@ impl Publishing {
             events: Outlet::for_events(&session, shared.keys.event())?,
             ledger: Ledger::new(slots),
             description: shared.description(),
+            state: State::new(shared.description().precision)?,
             shared,
             session,
             asker,
             feeds: BTreeMap::new(),
-            state: State::new(Precision::default())?,
             crowd: Crowd::default(),
             boarding: VecDeque::new(),
             changes: Vec::new(),
@@ -111,6 +111,7 @@ impl Publishing {
                 match change {
                     Change::Began { id, role, name, bytes_per_s } => self.begin_session(id, role, name, bytes_per_s),
                     Change::Resumed { from, to } => self.resume_session(from, to),
+                    Change::Said { slot, text } => self.publish_event(Event::Said { slot, text }),
                     Change::Ended { id, role, reason } => self.end_session(id, role, reason),
                 }
             }
@@ -206,7 +207,7 @@ impl Publishing {
             ArenaEvent::ActorAdded(actor) => self.publish_event(Event::ActorAdded(description::bounded_actor(&actor))),
             ArenaEvent::ActorRemoved(id) => self.publish_event(Event::ActorRemoved { id }),
             // The wire has no words for effects yet.
-            ArenaEvent::Effect(_) => {}
+            ArenaEvent::Effect(effect) => self.publish_event(Event::Effect(description::effect(&effect))),
             ArenaEvent::Entered { slot, name } => {
                 self.publish_event(Event::Joined { slot, name });
                 if let Some(id) = self.ledger.entered(slot) {

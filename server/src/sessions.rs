@@ -8,7 +8,8 @@
 //! comes back and shows its token or sends an input, or whoever proves to know the session's key resumes it over another
 //! one, with a new epoch and key.
 
-use pita_protocol::message::{InputFrame, InputPacket, ResumeProof, Role};
+use pita_protocol::chat;
+use pita_protocol::message::{InputFrame, InputPacket, ResumeProof, Role, SayRefusal, SayRequest};
 use pita_protocol::seal::{self, SessionKey};
 
 use crate::selection::LEAST_BYTES_PER_S;
@@ -110,6 +111,13 @@ pub enum Change {
         /// What it is from now on; the slot is the same.
         to: SessionId,
     },
+    /// A session says something that everybody is to read.
+    Said {
+        /// Its slot.
+        slot: u16,
+        /// One line.
+        text: String,
+    },
     /// A session ended.
     Ended {
         /// The session.
@@ -171,7 +179,16 @@ struct Session {
     inputs_tick: u64,
     inputs: u32,
     acknowledged: (u64, u32),
+    /// Of the newest thing that it said.
+    said_sequence: u32,
+    /// When it had said nothing for long enough to say [`SAID_AT_ONCE`] things, ms.
+    quiet_ms: u64,
 }
+
+/// A session may say one thing in so long, ms,
+const SAID_EVERY_MS: u64 = 1500;
+/// and so many at once after a silence: it bounds what waits to be published, too.
+const SAID_AT_ONCE: u64 = 4;
 
 /// Why nobody can join.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -230,6 +247,8 @@ impl Sessions {
             inputs_tick: 0,
             inputs: 0,
             acknowledged: (0, 0),
+            said_sequence: 0,
+            quiet_ms: 0,
         });
         let bytes_per_s = self.bytes_per_s(wish.bytes_per_s);
         self.changes.push(Change::Began { id, role, name: name.to_owned(), bytes_per_s });
@@ -259,6 +278,7 @@ impl Sessions {
         let to = SessionId { slot: from.slot, epoch: secrets.epoch };
         (session.epoch, session.key, session.acknowledged) = (to.epoch, secrets.key, (0, 0));
         (session.heard_ms, session.away_since_ms, session.last_sequence) = (now_ms, None, 0);
+        session.said_sequence = 0;
         self.changes.push(Change::Resumed { from, to });
         Ok(to)
     }
@@ -303,6 +323,30 @@ impl Sessions {
         session.acknowledged = (packet.snapshot_tick, packet.snapshots_before);
         (session.heard_ms, session.away_since_ms) = (now_ms, None);
         Ok(Received::Inputs(fresh))
+    }
+
+    /// Takes what the session on `slot` says; `request` is authentic.
+    ///
+    /// # Errors
+    /// [`SayRefusal`].
+    pub fn say(&mut self, slot: u16, request: &SayRequest, now_ms: u64) -> Result<(), SayRefusal> {
+        let text = chat::readable(&request.text);
+        let id = SessionId { slot, epoch: request.epoch };
+        let session = self.session_mut(id).ok_or(SayRefusal::NotYours)?;
+        if request.sequence <= session.said_sequence {
+            return Err(SayRefusal::NotYours);
+        }
+        session.said_sequence = request.sequence;
+        if text.is_empty() {
+            return Err(SayRefusal::Empty);
+        }
+        let quiet_ms = session.quiet_ms.max(now_ms) + SAID_EVERY_MS;
+        if let Some(wait_ms @ 1..) = quiet_ms.checked_sub(now_ms + SAID_AT_ONCE * SAID_EVERY_MS) {
+            return Err(SayRefusal::TooOften { wait_ms: wait_ms as u32 });
+        }
+        session.quiet_ms = quiet_ms;
+        self.changes.push(Change::Said { slot, text });
+        Ok(())
     }
 
     /// What the newest packet of a session acknowledged: the tick of a snapshot, 0 for none, and a bit for each before.

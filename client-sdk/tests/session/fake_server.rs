@@ -218,6 +218,8 @@ pub fn description(event_sequence: u32, actors: &[u32]) -> Description {
         tick: 100,
         event_sequence,
         gravity: [0.0, -9.81, 0.0],
+        precision: Precision::default(),
+        scores: Vec::new(),
         statics: Vec::new(),
         actors: actors.iter().map(|&id| actor(id)).collect(),
     }

@@ -3,6 +3,8 @@
 //! A slice is a row of [`Group`]s, each of one to three integers, in the order of its numbers. Quantisation knows
 //! nothing of streams and baselines: a state has one set of integers, whoever receives it.
 
+use serde::{Deserialize, Serialize};
+
 use super::quaternion::{ONE, isqrt};
 use crate::{WireError, codec::require};
 
@@ -40,7 +42,7 @@ impl Group {
 }
 
 /// How fine a stream is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Precision {
     /// Steps per m of points; 1 to 65536.
     pub point: u32,
@@ -59,7 +61,7 @@ impl Default for Precision {
 }
 
 impl Precision {
-    pub(super) fn check(&self) -> Result<(), WireError> {
+    pub(crate) fn check(&self) -> Result<(), WireError> {
         let fine = |steps| (1..=65_536).contains(&steps);
         require(fine(self.point) && fine(self.scalar) && fine(self.rate), "steps", "1 to 65536")?;
         require((64..=8192).contains(&self.rotation), "rotation steps", "64 to 8192")

@@ -80,6 +80,7 @@ fn declare(shared: &Arc<Shared>, session: &zenoh::Session, asker: &Asker) -> zen
         (keys.status(), Question::Status),
         (keys.ticks(), Question::Ticks),
         (keys.join(), Question::Join),
+        (keys.all_says(), Question::Say),
     ] {
         let asker = asker.clone();
         session.declare_queryable(key).callback(move |query| asker.ask(question, query)).background().wait()?;

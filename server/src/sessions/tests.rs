@@ -210,3 +210,30 @@ fn whoever_proves_it_resumes_once_in_the_same_slot_with_a_new_epoch_and_key() {
     // Also before anybody has noticed that the connection is gone.
     assert!(sessions.resume(&of(to, &SessionKey([78; 32])), secrets(80), 7003).is_ok());
 }
+
+#[test]
+fn sessions_say_a_few_things_at_once_and_then_one_by_one() {
+    let mut sessions = Sessions::new(LIMITS, &[]);
+    let id = join(&mut sessions, Role::Spectator, 0).unwrap();
+    let mut sequence = 0;
+    let mut say = |sessions: &mut Sessions, text: &str, now_ms| {
+        sequence += 1;
+        sessions.say(id.slot, &SayRequest { epoch: id.epoch, sequence, text: text.to_owned() }, now_ms)
+    };
+    for _ in 0..SAID_AT_ONCE {
+        assert_eq!(say(&mut sessions, "hello\n", 1000), Ok(()));
+    }
+    assert_eq!(say(&mut sessions, "hello", 1000), Err(SayRefusal::TooOften { wait_ms: 1500 }));
+    assert_eq!(say(&mut sessions, "hello", 2499), Err(SayRefusal::TooOften { wait_ms: 1 }));
+    assert_eq!(say(&mut sessions, "hello", 2500), Ok(()));
+    assert_eq!(say(&mut sessions, "\u{202e}", 60_000), Err(SayRefusal::Empty));
+    let old = SayRequest { epoch: id.epoch, sequence: 3, text: "hello".to_owned() };
+    assert_eq!(sessions.say(id.slot, &old, 60_000), Err(SayRefusal::NotYours), "a repetition");
+    let foreign = SayRequest { epoch: id.epoch + 1, sequence: 99, text: "hello".to_owned() };
+    assert_eq!(sessions.say(id.slot, &foreign, 60_000), Err(SayRefusal::NotYours));
+    assert_eq!(sessions.say(999, &foreign, 60_000), Err(SayRefusal::NotYours));
+    let mut changes = Vec::new();
+    sessions.take_changes(&mut changes);
+    let said = |change: &&Change| **change == Change::Said { slot: id.slot, text: "hello".to_owned() };
+    assert_eq!(changes.iter().filter(said).count(), 5);
+}

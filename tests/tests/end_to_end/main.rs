@@ -4,6 +4,8 @@
 //! and bounded.
 
 mod bad_network;
+mod budget;
+mod chat;
 mod clients;
 mod daemon;
 mod driving;

@@ -54,6 +54,8 @@ fn roster(count: u32) -> Roster {
         tick: 0,
         event_sequence: 0,
         gravity: [0.0; 3],
+        precision: Precision::default(),
+        scores: Vec::new(),
         statics: Vec::new(),
         actors: (0..count).map(car).collect(),
     })
