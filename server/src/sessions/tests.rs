@@ -11,6 +11,10 @@ const LIMITS: Limits = Limits {
     bytes_per_s: 64_000,
 };
 
+fn player(name: &str) -> Wish<'_> {
+    Wish { name, role: Role::Player, bytes_per_s: None }
+}
+
 fn join(sessions: &mut Sessions, role: Role, now_ms: u64) -> Result<SessionId, JoinRefusal> {
     static EPOCHS: AtomicU32 = AtomicU32::new(1);
     let secrets = secrets(EPOCHS.fetch_add(1, Ordering::Relaxed));
@@ -141,8 +145,7 @@ fn nobody_joins_a_closing_server() {
 #[test]
 fn names_are_taken_once_and_banned_ones_never() {
     let mut sessions = Sessions::new(LIMITS, &["Mallory".to_owned()]);
-    let mut join =
-        |name: &str, epoch| sessions.join(Wish { name, role: Role::Player, bytes_per_s: None }, secrets(epoch), 0);
+    let mut join = |name: &str, epoch| sessions.join(player(name), secrets(epoch), 0);
     assert!(join("Wu", 1).is_ok());
     assert_eq!(join(" wU ", 2), Err(JoinRefusal::NameTaken));
     assert_eq!(join("mallorY", 3), Err(JoinRefusal::Banned));
@@ -153,7 +156,7 @@ fn names_are_taken_once_and_banned_ones_never() {
 /// A player without a connection since 1000 ms, who has 3000 ms to come back.
 fn away() -> (Sessions, SessionId) {
     let mut sessions = Sessions::new(Limits { resume_grace_ms: 3000, ..LIMITS }, &[]);
-    let id = sessions.join("Wu", Role::Player, secrets(77), 0).unwrap();
+    let id = sessions.join(player("Wu"), secrets(77), 0).unwrap();
     sessions.receive(id.slot, &packet(id.epoch, &[40]), 1, 900).unwrap();
     sessions.token_disappeared(id, 1000);
     taken(&mut sessions);
@@ -166,7 +169,7 @@ fn a_lost_player_has_a_grace_time_in_which_its_name_and_slot_are_kept() {
     let (mut sessions, id) = away();
     sessions.expire(4000);
     assert_eq!(taken(&mut sessions), []);
-    assert_eq!(sessions.join("Wu", Role::Player, secrets(1), 4000), Err(JoinRefusal::NameTaken));
+    assert_eq!(sessions.join(player("Wu"), secrets(1), 4000), Err(JoinRefusal::NameTaken));
     sessions.expire(4001);
     assert_eq!(taken(&mut sessions), [ended(id, EndReason::ConnectionLost)]);
 }
