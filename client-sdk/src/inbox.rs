@@ -90,7 +90,8 @@ impl Inbox {
             }
         };
         let frame = match self.decoder.decode(head.tick, &head.dof) {
-            Ok(frame) => Arc::clone(frame),
+            // Of each body the newest state that is known, where this is the newest snapshot.
+            Ok(frame) => self.decoder.view().filter(|view| view.tick() == frame.tick()).map_or(frame, Arc::clone),
             Err(error) => {
                 self.statistics.malformed += 1;
                 if error == WireError::Desync {

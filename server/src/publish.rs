@@ -250,7 +250,7 @@ impl Publishing {
                     feed.selection.acknowledge(tick);
                 }
             }
-            let chosen = feed.selection.choose(&feed.encoder, frame.tick, &self.state, &self.crowd, id.slot);
+            let chosen = feed.selection.choose(&mut feed.encoder, frame.tick, &self.state, &self.crowd, id.slot);
             self.snapshot.dof = feed.encoder.encode(frame.tick, &self.state, chosen);
             // Acknowledgements are in order of slot.
             let found = frame.acks.binary_search_by_key(&id.slot, |(acked, _)| acked.slot).map(|at| frame.acks[at]);

@@ -48,7 +48,7 @@ impl Selection {
 
     /// Which bodies of `state` the snapshot of `tick` carries to the session on `slot`; empty for all. To be followed by
     /// [`Selection::sent`].
-    pub fn choose(&mut self, encoder: &Encoder, tick: u64, state: &State, crowd: &Crowd, slot: u16) -> &[bool] {
+    pub fn choose(&mut self, encoder: &mut Encoder, tick: u64, state: &State, crowd: &Crowd, slot: u16) -> &[bool] {
         let acknowledged = *self.acknowledged.get_or_insert(tick);
         self.budget.fill(tick.saturating_sub(acknowledged));
         encoder.needs(tick, state, &mut self.needs);

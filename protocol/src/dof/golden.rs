@@ -36,7 +36,7 @@ fn golden_vectors_decode_to_what_they_mean() {
         let mut next = || fields.next().unwrap();
         let (tick, bytes, expected) = (next().parse().unwrap(), bytes_of(next()), next());
         let frame = decoder.decode(tick, &bytes).unwrap_or_else(|error| panic!("tick {tick}: {error}"));
-        assert_eq!(meaning(frame).trim(), expected, "tick {tick}");
+        assert_eq!(meaning(&frame).trim(), expected, "tick {tick}");
         count += 1;
     }
     assert!(count > 20);
@@ -69,7 +69,7 @@ fn write_golden_vectors() {
         let bytes = encoder.encode(tick, &state, &chosen);
         let frame = decoder.decode(tick, &bytes).unwrap();
         let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-        writeln!(out, "{tick} {hex}{}", meaning(frame)).unwrap();
+        writeln!(out, "{tick} {hex}{}", meaning(&frame)).unwrap();
         if tick > 3 && tick % 7 > 0 {
             encoder.acknowledge(tick - 2, 0b101);
         }

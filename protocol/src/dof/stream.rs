@@ -5,12 +5,13 @@
 //! │ flags │ base age   │ span      │ check   │ steps: 4 × u32 LE       │ coded bodies          │
 //! │ u8    │ u8, flag 0 │ u8, fl. 1 │ u16 LE  │ without flag 0 only     │ n bytes               │
 //! └───────┴────────────┴───────────┴─────────┴─────────────────────────┴───────────────────────┘
-//! flags: 1 has a baseline (base age ticks older), 2 has an earlier one (span ticks before the baseline), 4 partial
+//! flags: 1 has a baseline (base age ticks older), 2 has an earlier one (span ticks before the baseline), 4 partial,
+//!        8 the base is both of them together, each body as it was newer
 //! ```
 //!
 //! An [`Encoder`] codes against nothing that was not acknowledged. So a lost, late or repeated snapshot harms no other.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 use super::budget::{Need, Spent};
@@ -31,34 +32,47 @@ pub const SNAPSHOT_MAX: usize = 1 << 20;
 const HAS_BASE: u8 = 1;
 const HAS_EARLIER: u8 = 2;
 const PARTIAL: u8 = 4;
+const MERGED: u8 = 8;
 
 /// Writes a stream for one receiver, or one cell.
 #[derive(Debug, Default)]
 pub struct Encoder {
-    /// Oldest first, each with whether the receiver is known to have it.
-    sent: VecDeque<(Frame, bool)>,
+    /// Oldest first.
+    sent: VecDeque<Sent>,
+    /// What the two newest that the receiver has come to, where one alone is not all that it has; with their ticks.
+    merged: Option<((u64, u64), Frame)>,
     spent: Spent,
+}
+
+#[derive(Debug)]
+struct Sent {
+    frame: Frame,
+    /// Whether the receiver is known to have it.
+    is_had: bool,
+    /// Whether it may lack what others have.
+    is_partial: bool,
 }
 
 impl Encoder {
     /// The receiver has the snapshot of `tick`, and of each set bit i of `before` that of `tick − 1 − i`.
     pub fn acknowledge(&mut self, tick: u64, before: u32) {
-        for (frame, has) in &mut self.sent {
-            *has |= match tick.checked_sub(frame.tick) {
+        for Sent { frame, is_had, .. } in &mut self.sent {
+            *is_had |= match tick.checked_sub(frame.tick) {
                 Some(0) => true,
                 Some(age) if age <= 32 => before >> (age - 1) & 1 == 1,
                 _ => false,
             };
         }
         // What is older than two that the receiver has is not needed again.
-        let newest = self.sent.iter().rposition(|(_, has)| *has);
-        let earlier = newest.and_then(|newest| self.sent.range(..newest).rposition(|(_, has)| *has));
+        let newest = self.sent.iter().rposition(|sent| sent.is_had);
+        let earlier = newest.and_then(|newest| self.sent.range(..newest).rposition(|sent| sent.is_had));
         drop(self.sent.drain(..earlier.or(newest).unwrap_or(0)));
     }
 
     /// The receiver lost the thread: the next snapshot needs nothing before it.
     pub fn restart(&mut self) {
         self.sent.clear();
+        self.merged = None;
     }
 
     /// Codes the snapshot of `tick`, which is newer than all before. `chosen` says for each body of the state whether it
@@ -67,21 +81,27 @@ impl Encoder {
     /// # Panics
     /// Where `tick` is not newer than all before.
     pub fn encode(&mut self, tick: u64, state: &State, chosen: &[bool]) -> Vec<u8> {
-        assert!(self.sent.back().is_none_or(|(last, _)| last.tick < tick), "ticks ascend");
+        assert!(self.sent.back().is_none_or(|last| last.frame.tick < tick), "ticks ascend");
+        self.merge(tick);
         let (base, earlier) = self.baselines(tick);
-        let (bytes, next, spent) = encode_against(base, earlier, tick, Source { state, chosen });
+        let merged = self.merged.as_ref().map(|(_, merged)| merged);
+        let against = Against { base, earlier, merged };
+        let (bytes, frame, spent) = encode_against(&against, tick, Source { state, chosen });
         self.spent = spent;
         if self.sent.len() == HISTORY {
             self.sent.pop_front();
         }
-        self.sent.push_back((next, false));
+        // What does not carry everything may be no more than a part of what the receiver has.
+        let is_partial = chosen.contains(&false);
+        self.sent.push_back(Sent { frame, is_had: false, is_partial });
         bytes
     }
 
     /// What each body of `state` has to tell the receiver that the snapshot of `tick` is coded for, in their order.
-    pub fn needs(&self, tick: u64, state: &State, into: &mut Vec<Need>) {
+    pub fn needs(&mut self, tick: u64, state: &State, into: &mut Vec<Need>) {
         into.clear();
-        let base = self.baselines(tick).0;
+        self.merge(tick);
+        let base = self.merged.as_ref().map(|(_, merged)| merged).or(self.baselines(tick).0);
         let mut known = base.map_or(&[][..], |base| &base.bodies).iter().peekable();
         for body in state.bodies() {
             while known.next_if(|known| known.id < body.id).is_some() {}
@@ -102,8 +122,26 @@ impl Encoder {
 
     /// The newest frame that the receiver has, and the one before.
     fn baselines(&self, tick: u64) -> (Option<&Frame>, Option<&Frame>) {
-        let mut known = self.sent.iter().rev().filter(|(frame, has)| *has && tick - frame.tick <= AGE_MAX);
-        (known.next().map(|(frame, _)| frame), known.next().map(|(frame, _)| frame))
+        let mut known = self.known(tick).map(|sent| &sent.frame);
+        (known.next(), known.next())
+    }
+
+    /// Snapshots that the receiver has, newest first.
+    fn known(&self, tick: u64) -> impl Iterator<Item = &Sent> {
+        self.sent.iter().rev().filter(move |sent| sent.is_had && tick - sent.frame.tick <= AGE_MAX)
+    }
+
+    /// Joins the two newest that the receiver has, where the newest alone may lack something.
+    fn merge(&mut self, tick: u64) {
+        let mut known = self.known(tick);
+        let pair = known.next().filter(|newest| newest.is_partial).zip(known.next());
+        let pair = pair.filter(|(newest, earlier)| newest.frame.tick - earlier.frame.tick <= AGE_MAX);
+        let ticks = pair.map(|(newest, earlier)| (newest.frame.tick, earlier.frame.tick));
+        if self.merged.as_ref().map(|(ticks, _)| *ticks) != ticks {
+            let merged = pair.map(|(newest, earlier)| newest.frame.merged(&earlier.frame, |_| true));
+            drop(known);
+            self.merged = ticks.zip(merged);
+        }
     }
 
     /// Forgets the snapshot that was coded last: it is not sent, or nothing will build on it.
@@ -113,7 +151,7 @@ impl Encoder {
 
     /// The frame that was coded last.
     pub fn last(&self) -> Option<&Frame> {
-        self.sent.back().map(|(frame, _)| frame)
+        self.sent.back().map(|sent| &sent.frame)
     }
 }
 
@@ -123,13 +161,19 @@ fn need(had: &[GroupState], now: &[Quantised], precision: &Precision) -> Need {
     if changed == 0 { Need::Nothing } else { Need::Update { groups: changed as u16 } }
 }
 
+/// What a snapshot is coded against.
+struct Against<'a> {
+    /// The newest frame that the receiver has.
+    base: Option<&'a Frame>,
+    /// The one before.
+    earlier: Option<&'a Frame>,
+    /// Both together.
+    merged: Option<&'a Frame>,
+}
+
 /// The snapshot of `tick` as bytes, the frame that a receiver has after it, and what bodies took of the bytes.
-fn encode_against(
-    base: Option<&Frame>,
-    earlier: Option<&Frame>,
-    tick: u64,
-    source: Source<'_>,
-) -> (Vec<u8>, Frame, Spent) {
+fn encode_against(against: &Against<'_>, tick: u64, source: Source<'_>) -> (Vec<u8>, Frame, Spent) {
+    let Against { base, earlier, merged } = *against;
     let partial = source.chosen.iter().any(|carried| !carried);
     let mut bytes = vec![u8::from(partial) * PARTIAL];
     if let Some(base) = base {
@@ -141,10 +185,13 @@ fn encode_against(
         bytes[0] |= HAS_EARLIER;
         bytes.push(span);
     }
+    if merged.is_some() {
+        bytes[0] |= MERGED;
+    }
     let check_at = bytes.len();
     bytes.extend([0; 2]);
     let empty;
-    let base = match base {
+    let base = match merged.or(base) {
         Some(base) => base,
         None => {
             empty = Frame::empty(*source.state.precision());
@@ -170,6 +217,17 @@ fn encode_against(
 pub struct Decoder {
     /// Oldest first.
     had: VecDeque<Arc<Frame>>,
+    view: Option<Arc<Frame>>,
+    /// Bodies of the view that newer snapshots do not know, with the first of those.
+    unheard: BTreeMap<u32, u64>,
+}
+
+/// Ticks after which a body of the view goes of which newer snapshots know nothing.
+const UNHEARD_MAX: u64 = 2 * HISTORY as u64;
+
+/// Bodies of `base` that are not in `next`, in order.
+fn gone(base: &Frame, next: &Frame) -> Vec<u32> {
+    base.bodies.iter().map(|body| body.id).filter(|&id| next.find(id).is_none()).collect()
 }
 
 impl Decoder {
@@ -179,11 +237,11 @@ impl Decoder {
     /// [`WireError::Malformed`] and [`WireError::Content`] for what no encoder writes, [`WireError::NoBaseline`] where
     /// this side does not have what the snapshot is coded against, [`WireError::Desync`] where the states differ. After
     /// an error all is as before.
-    pub fn decode(&mut self, tick: u64, bytes: &[u8]) -> Result<&Arc<Frame>, WireError> {
+    pub fn decode(&mut self, tick: u64, bytes: &[u8]) -> Result<Arc<Frame>, WireError> {
         require(bytes.len() <= SNAPSHOT_MAX, "snapshot", "at most 1 MiB")?;
         let mut header = Header { bytes };
         let [flags] = header.take()?;
-        require(flags & !(HAS_BASE | HAS_EARLIER | PARTIAL) == 0, "snapshot flags", "those that are known")?;
+        require(flags & !(HAS_BASE | HAS_EARLIER | PARTIAL | MERGED) == 0, "snapshot flags", "those that are known")?;
         let empty;
         let (mut base, mut earlier) = (None, None);
         if flags & HAS_BASE != 0 {
@@ -197,8 +255,13 @@ impl Decoder {
             require(span > 0, "span of the baselines", "1 to 255")?;
             earlier = Some(self.at(base.tick.checked_sub(span.into()))?);
         }
+        let merged = match (flags & MERGED != 0, base.zip(earlier)) {
+            (true, Some((base, earlier))) => Some(base.merged(earlier, |_| true)),
+            (true, None) => return Err(WireError::Malformed),
+            (false, _) => None,
+        };
         let check = u16::from_le_bytes(header.take()?);
-        let base = match base {
+        let base = match merged.as_ref().or(base) {
             Some(base) => base,
             None => {
                 let mut steps = || Ok::<_, WireError>(u32::from_le_bytes(header.take()?));
@@ -216,7 +279,40 @@ impl Decoder {
         if coder.is_exhausted() || next.check() != check {
             return Err(WireError::Desync);
         }
-        Ok(self.keep(next))
+        let gone = if partial { gone(base, &next) } else { Vec::new() };
+        let frame = self.keep(next);
+        self.look(&frame, partial, &gone);
+        Ok(frame)
+    }
+
+    /// All that is known as of the newest snapshot: of each body its newest state, whichever snapshot brought it.
+    pub fn view(&self) -> Option<&Arc<Frame>> {
+        self.view.as_ref()
+    }
+
+    /// Takes over into the view what the snapshot `frame` says. Bodies that it does not know stay in the view for as long
+    /// as it may be coded against an older one: it may not have heard of them yet.
+    fn look(&mut self, frame: &Arc<Frame>, partial: bool, gone: &[u32]) {
+        if self.view.as_ref().is_some_and(|view| view.tick >= frame.tick) {
+            return;
+        }
+        let is_gone = |id: u32| gone.binary_search(&id).is_ok();
+        self.unheard.retain(|id, _| frame.find(*id).is_none() && !is_gone(*id));
+        self.view = match self.view.take() {
+            Some(view) if partial => {
+                for (body, _) in view.bodies().filter(|(body, _)| frame.find(body.id).is_none()) {
+                    self.unheard.entry(body.id).or_insert(frame.tick);
+                }
+                let is_fresh = |id: u32| {
+                    let since = self.unheard.get(&id).copied().unwrap_or(frame.tick);
+                    !is_gone(id) && frame.tick - since < UNHEARD_MAX
+                };
+                Some(Arc::new(frame.merged(&view, is_fresh)))
+            }
+            _ => Some(Arc::clone(frame)),
+        };
+        let view = self.view.as_ref();
+        self.unheard.retain(|id, _| view.is_some_and(|view| view.find(*id).is_some()));
     }
 
     /// The newest frame.
@@ -237,8 +333,9 @@ impl Decoder {
         Ok(&self.had[at])
     }
 
-    fn keep(&mut self, frame: Frame) -> &Arc<Frame> {
+    fn keep(&mut self, frame: Frame) -> Arc<Frame> {
         let frame = Arc::new(frame);
+        let kept = Arc::clone(&frame);
         let at = match self.had.binary_search_by_key(&frame.tick, |had| had.tick) {
             Ok(at) => {
                 self.had[at] = frame;
@@ -251,7 +348,7 @@ impl Decoder {
         };
         let over = self.had.len().saturating_sub(HISTORY).min(at);
         self.had.drain(..over);
-        &self.had[at - over]
+        kept
     }
 }
 

@@ -66,11 +66,11 @@ fn watch(boxes: u32, bytes_per_s: u32, ticks: u64) -> Seen {
             encoder.acknowledge(newest, before);
             selection.acknowledge(newest);
         }
-        let chosen = selection.choose(&encoder, tick, &field.state, &field.crowd, 0).to_vec();
+        let chosen = selection.choose(&mut encoder, tick, &field.state, &field.crowd, 0).to_vec();
         let bytes = encoder.encode(tick, &field.state, &chosen);
         selection.sent(bytes.len(), &encoder);
-        let frame = decoder.decode(tick, &bytes).unwrap();
-        let ages: Vec<_> = frame.bodies().map(|(body, at)| (body.id, tick - at)).collect();
+        decoder.decode(tick, &bytes).unwrap();
+        let ages: Vec<_> = decoder.view().unwrap().bodies().map(|(body, at)| (body.id, tick - at)).collect();
         seen.without_own += usize::from(ages.iter().any(|&(id, age)| id < 3 && age > 0));
         if ages.len() == field.state.bodies().len() {
             seen.complete.get_or_insert(tick);
@@ -96,7 +96,7 @@ fn ten_thousand_bodies_arrive_within_the_budget_and_starve_nobody() {
 
 #[test]
 fn a_small_budget_means_fewer_bodies_each_of_them_new() {
-    let (rich, poor) = (watch(200, 64_000, 300), watch(200, 8_000, 300));
+    let (rich, poor) = (watch(600, 64_000, 300), watch(600, 8_000, 300));
     let rate = |seen: &Seen| seen.bytes[150..].iter().sum::<usize>() as f64 / 5.0;
     assert!(rate(&poor) < 8_800.0, "{} bytes/s", rate(&poor));
     assert!(rich.ages.iter().all(|&age| age == 0), "all fit");

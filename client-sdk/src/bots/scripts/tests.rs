@@ -71,7 +71,7 @@ fn snapshot(tick: u64, cars: &[Car]) -> ReceivedSnapshot {
         state.push(10 * id, kind::RIGID_BODY, None, &layout, &numbers).unwrap();
     }
     let dof = Encoder::default().encode(tick, &state, &[]);
-    let frame = Arc::clone(Decoder::default().decode(tick, &dof).unwrap());
+    let frame = Decoder::default().decode(tick, &dof).unwrap();
     let head = Snapshot { epoch: 0, tick, ack: InputAck::default(), event_sequence: 0, dof };
     ReceivedSnapshot::new(head, frame, 30.0, Instant::now())
 }

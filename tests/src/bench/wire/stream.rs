@@ -83,7 +83,7 @@ pub fn run(trace: &Trace, link: Link) -> Result<Cost, EntryError> {
             let frame = frame?;
             if counts {
                 cost.decode_us.push(decode_us);
-                cost.compare(frame, bodies, trace);
+                cost.compare(&frame, bodies, trace);
             }
         }
         let heard = !random.random_bool(link.loss);
