@@ -1,6 +1,6 @@
 //! The scripts drive a kinematic bicycle: no network, no engine.
 
-use std::{sync::Arc, time::Instant};
+use std::time::Instant;
 
 use glam::{Quat, Vec3};
 use pita_protocol::{
