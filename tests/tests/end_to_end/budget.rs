@@ -12,6 +12,7 @@ use crate::{SOON, await_clients, observed, pita_server};
 const FIELD: &str = r#"
 name = "field"
 title = "A thousand crates"
+max_players = 16
 
 [materials.grass]
 friction = 0.9
