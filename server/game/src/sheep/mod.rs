@@ -245,7 +245,7 @@ impl Actor for Sheep {
             self.think(step, &motion);
         }
         let sleeps = self.rig.bodies().iter().all(|&body| step.world.is_asleep(body));
-        if sleeps && self.mind.wish() == DVec3::ZERO {
+        if sleeps && motion.upright > UPRIGHT && self.mind.wish() == DVec3::ZERO {
             return Ok(());
         }
         self.has_ground |= sleeps;

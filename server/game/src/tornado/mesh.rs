@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use glam::{DQuat, DVec2, DVec3};
+use pita_sim::collide::TriangleMesh;
 use pita_sim::{BodyId, FigureDesc, SimError, World};
 
 use super::TornadoParameters;
@@ -21,15 +22,27 @@ const BENT_MAX: f64 = 1.2;
 /// Least share of its size that a tornado which is not there is drawn with.
 const LEAST: f64 = 0.1;
 
-/// Points of the mesh before it is warped, ring by ring from the foot, m.
-pub fn mesh(p: &TornadoParameters) -> Vec<DVec3> {
+/// The funnel before it is warped, open at both ends: points ring by ring from the foot, m.
+///
+/// # Errors
+/// What the engine says of sizes that leave triangles without area.
+pub fn mesh(p: &TornadoParameters) -> Result<TriangleMesh, SimError> {
     let point = |ring: usize, sector: usize| {
         let share = ring as f64 / (RINGS - 1) as f64;
         let radius = p.foot_radius + (p.top_radius - p.foot_radius) * share;
         let around = DQuat::from_rotation_y(TAU * sector as f64 / SECTORS as f64);
         around * DVec3::X * radius + DVec3::Y * p.height * share
     };
-    (0..RINGS).flat_map(|ring| (0..SECTORS).map(move |sector| point(ring, sector))).collect()
+    let points: Vec<_> = (0..RINGS).flat_map(|ring| (0..SECTORS).map(move |sector| point(ring, sector))).collect();
+    let corner = |ring: usize, sector: usize| (ring * SECTORS + sector % SECTORS) as u32;
+    // Sectors go to the right, seen from outside.
+    let quad = |ring: usize, sector: usize| {
+        let [a, b] = [sector, sector + 1].map(|sector| corner(ring, sector));
+        let [c, d] = [sector, sector + 1].map(|sector| corner(ring + 1, sector));
+        [[a, b, d], [a, d, c]]
+    };
+    let quads = (0..RINGS - 1).flat_map(|ring| (0..SECTORS).map(move |sector| quad(ring, sector)));
+    TriangleMesh::new(&points, &quads.flatten().collect::<Vec<_>>())
 }
 
 /// What spins and warps the funnel: it says what the funnel's DOF shall be, and the integrator moves them there.

@@ -13,6 +13,8 @@ mod path;
 mod victims;
 mod vortex;
 
+use std::sync::Arc;
+
 use glam::{DQuat, DVec3};
 use pita_sim::{BodyId, Phase, Shape, SimError, World};
 
@@ -77,11 +79,12 @@ impl ActorKind for Tornado {
         let column = Column::add(site.world, p, start)?;
         let path = Path::add(site.world, column.foot(), &p.legs, p.path_acceleration)?;
         let warping = Warping::add(site.world, p, start)?;
-        // Out of sight, below the ground.
-        let dust = Particles::add(site.world, p.dust, DUST_GRIP, start - DVec3::Y)?;
+        // Out of sight, below the ground, and where nothing is lost.
+        let parked = (start - DVec3::Y).max(site.file.bounds.min.into());
+        let dust = Particles::add(site.world, p.dust, DUST_GRIP, parked)?;
         let grain = Shape::Ball { radius: DUST_RADIUS };
         // The funnel is of a kind of the game's own: its shape is the mesh before it is warped.
-        let funnel = Shape::Hull { points: mesh::mesh(p), radius: 0.0 };
+        let funnel = Shape::Mesh(Arc::new(mesh::mesh(p)?));
         let spheres = column.bodies().iter().copied().zip(column.shapes().iter().cloned());
         let all = spheres.chain([(warping.body(), funnel)]).chain(dust.bodies().map(|body| (body, grain.clone())));
         let (bodies, parts) = all.map(|(body, shape)| (body, PartInfo::new(site.world, body, shape))).unzip();
@@ -105,13 +108,9 @@ impl ActorKind for Tornado {
 impl Tornado {
     /// Moves it along its path, and lets it come and go.
     fn update_forces(&mut self, step: &mut Step) -> Result<(), SimError> {
-        match self.life.pass(step.dt) {
-            Some(life::Phase::Appearing) => {
-                self.path.go_on(step.world, self.column.foot())?;
-                self.column.place(step.world, self.path.target())?;
-            }
-            Some(life::Phase::Away) => self.victims.drop_all(step.world, self.parameters.peace_time),
-            _ => {}
+        if self.life.pass(step.dt) == Some(life::Phase::Appearing) {
+            self.path.go_on(step.world, self.column.foot())?;
+            self.column.place(step.world, self.path.target())?;
         }
         self.column.push(step.world, &mut self.path, step.dt)
     }
@@ -124,7 +123,11 @@ impl Tornado {
 
     /// Takes hold of those that the collision procedure saw, and swirls those that it holds.
     fn update_victims(&mut self, step: &mut Step) -> Result<(), SimError> {
-        let is_looking = step.is_due(self.parameters.sense_period) && self.life.strength() >= LEAST_STRENGTH;
+        let is_weak = self.life.strength() < LEAST_STRENGTH;
+        if is_weak {
+            self.victims.drop_all(step.world, self.parameters.peace_time);
+        }
+        let is_looking = step.is_due(self.parameters.sense_period) && !is_weak;
         for seen in self.seen.drain(..) {
             if let Some(victim) = step.owner(seen).filter(|_| is_looking) {
                 self.victims.add(step.world, &self.parameters, victim.body)?;
@@ -171,7 +174,7 @@ impl Actor for Tornado {
         if is_ground && contact.own.body == Some(self.column.foot()) {
             // Its sphere reaches farther than the foot itself.
             let p = &self.parameters;
-            self.touches_ground = contact.phase != Phase::End && contact.gap <= p.foot_radius - p.reach;
+            self.touches_ground |= contact.phase != Phase::End && contact.gap <= p.foot_radius - p.reach;
         }
         if let Some(body) = contact.other.body.filter(|_| self.is_valid_victim(contact)) {
             let is_news = !self.seen.contains(&body) && self.seen.len() < self.seen.capacity();
@@ -187,6 +190,7 @@ impl Actor for Tornado {
         if step.is_due(self.parameters.fx_period) {
             self.update_fx(step)?;
         }
+        self.touches_ground = false;
         Ok(())
     }
 

@@ -8,6 +8,7 @@ mod driving;
 mod examples;
 mod free_form;
 mod handling;
+mod pasture;
 mod pipeline;
 mod players;
 mod props;

@@ -104,6 +104,38 @@ fn sheep_flee_a_car() {
     assert!(afraid > 3.0 && fearless < 2.7, "{afraid} m and {fearless} m");
 }
 
+/// Who fears nothing is run over by a car at full speed, flies no faster than twice that, and gets up.
+#[test]
+fn a_sheep_that_is_run_over_gets_up() {
+    for form in FORMS {
+        let keys = format!("{form}\nfear_radius = 0.0");
+        let mut track = TestTrack::new(&format!("{ROAD}{}", flock(1, [10.0, 0.0], &keys)), SETTINGS);
+        track.enter(0);
+        let (mut fastest, mut least, mut car) = (0.0f64, 1.0f64, 0.0f64);
+        for tick in 0..30 * 14 {
+            // Full speed until it has hit; then it goes, and does not stand on top of it.
+            match tick {
+                0..150 => track.drive(0, Controls { throttle: 1.0, ..Controls::default() }),
+                150 => track.leave(0),
+                _ => {}
+            }
+            run(&mut track, 1.0 / 30.0);
+            if tick < 150 {
+                car = car.max(track.car(0).velocity.length());
+            }
+            let world = track.arena.world();
+            let sheep = sheep(&track).remove(0).parts[0].slice;
+            let id = world.bodies().iter().find(|&&id| world.serial(id) == Some(sheep)).copied().unwrap();
+            fastest = fastest.max(world.velocity(id).unwrap().length());
+            least = least.min(stand(&track)[0].1);
+        }
+        assert!(car > 12.0 && fastest > 4.0 && fastest < 2.0 * car, "{form}: {fastest} m/s by a car at {car}");
+        assert!(least < 0.7, "{form}: it was not knocked over: {least}");
+        let (at, upright) = stand(&track)[0];
+        assert!(upright > 0.9 && (at.y - 0.79).abs() < 0.1, "{form}: {upright} at {at}");
+    }
+}
+
 /// The tornado throws them about and they get up again, in every form.
 #[test]
 fn sheep_are_thrown_about_and_get_up() {

@@ -1,0 +1,38 @@
+//! The sheep pasture as it ships: its tornado lifts what it meets and drops it, and the sheep stay.
+
+use std::collections::BTreeSet;
+
+use pita_sim::DVec3;
+
+use crate::test_track::{SETTINGS, TestTrack};
+
+const PASTURE: &str = include_str!("../../../../configs/arenas/sheep-pasture.toml");
+
+/// Slices of what is called `kind`, one for each actor.
+fn slices(track: &TestTrack, kind: &str) -> BTreeSet<u32> {
+    track.arena.actors().filter(|actor| actor.kind == kind).map(|actor| actor.parts[0].slice).collect()
+}
+
+#[test]
+fn sheep_fly_and_come_down() {
+    let mut track = TestTrack::new(PASTURE, SETTINGS);
+    let sheep = slices(&track, "sheep");
+    assert_eq!((sheep.len(), slices(&track, "tornado").len()), (40, 1));
+    let mut flown = BTreeSet::new();
+    for tick in 0..40 * 30 {
+        track.tick();
+        let world = track.arena.world();
+        assert_eq!(world.report().quarantined, 0, "tick {tick}: {:?}", world.report());
+        for slice in world.slices().filter(|slice| sheep.contains(&slice.serial)) {
+            let (at, speed) = (DVec3::from_slice(slice.q), DVec3::from_slice(slice.v).length());
+            assert!(at.x.abs() < 100.0 && at.z.abs() < 100.0, "tick {tick}: a sheep at {at}");
+            assert!(at.y > 0.0 && at.y < 30.0 && speed < 40.0, "tick {tick}: a sheep at {at} with {speed} m/s");
+            if at.y > 5.0 {
+                flown.insert(slice.serial);
+            }
+        }
+    }
+    assert!(flown.len() >= 3, "{} sheep flew", flown.len());
+    let up = track.arena.world().slices().filter(|slice| flown.contains(&slice.serial) && slice.q[1] > 5.0).count();
+    assert!(up < flown.len(), "all of {up} are still up");
+}
