@@ -206,8 +206,11 @@ impl Publishing {
         match event {
             ArenaEvent::ActorAdded(actor) => self.publish_event(Event::ActorAdded(description::bounded_actor(&actor))),
             ArenaEvent::ActorRemoved(id) => self.publish_event(Event::ActorRemoved { id }),
-            // The wire has no words for effects yet.
             ArenaEvent::Effect(effect) => self.publish_event(Event::Effect(description::effect(&effect))),
+            ArenaEvent::KnockedOut { actor, by } => self.publish_event(Event::KnockedOut { actor, by }),
+            ArenaEvent::Scored { actor, points } => self.publish_event(Event::Scored { actor, points }),
+            ArenaEvent::RoundEnded { number, winner } => self.publish_event(Event::RoundEnded { number, winner }),
+            ArenaEvent::RoundBegan { number } => self.publish_event(Event::RoundBegan { number }),
             ArenaEvent::Entered { slot, name } => {
                 self.publish_event(Event::Joined { slot, name });
                 if let Some(id) = self.ledger.entered(slot) {

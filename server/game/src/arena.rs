@@ -4,12 +4,14 @@
 //! the outside's is a method here. Reading it never changes it.
 
 mod build;
+mod cast;
 mod collisions;
 mod logic;
 mod placing;
 mod players;
 mod rehearsed;
 mod reload;
+pub mod rounds;
 
 use std::collections::BTreeMap;
 
@@ -19,10 +21,13 @@ use pita_sim::{BodyId, Collision, Shape, World};
 use crate::Controls;
 use crate::actor::{Actor, ActorInfo};
 use crate::arena_file::{BoundsFile, Materials};
+use crate::combat::CombatParameters;
 use crate::pipeline::Ports;
 use crate::spawn::Pose;
 use crate::step::{Effect, LogicReport, Other, Request};
 use crate::vehicle::VehicleParameters;
+use cast::Cast;
+pub use rounds::Rounds;
 
 pub use build::Supplies;
 use placing::Placed;
@@ -72,6 +77,32 @@ pub enum ArenaEvent {
     ActorRemoved(u32),
     /// Something to see or hear.
     Effect(Effect),
+    /// An actor is knocked out.
+    KnockedOut {
+        /// Who.
+        actor: u32,
+        /// Whose merit it is.
+        by: Option<u32>,
+    },
+    /// An actor has more points than before.
+    Scored {
+        /// Who.
+        actor: u32,
+        /// In this round.
+        points: u32,
+    },
+    /// A round is over.
+    RoundEnded {
+        /// Counts rounds, from 1.
+        number: u32,
+        /// Who has most points; nobody where nobody has any.
+        winner: Option<u32>,
+    },
+    /// A round begins; everybody starts anew.
+    RoundBegan {
+        /// Counts rounds, from 1.
+        number: u32,
+    },
     /// A player has a slot now.
     Entered {
         /// Slot.
@@ -113,6 +144,11 @@ pub struct Arena {
     bounds: BoundsFile,
     materials: Materials,
     vehicle: VehicleParameters,
+    /// `None` where nobody fights.
+    combat: Option<CombatParameters>,
+    rounds: Option<Rounds>,
+    /// Who fills empty places; `None` where nobody does.
+    cast: Option<Cast>,
     /// Never empty.
     spawns: Vec<Pose>,
     /// By id.
@@ -192,6 +228,11 @@ impl Arena {
         self.actors.get(&id).map(|actor| &**actor)
     }
 
+    /// The round of combat that is on; `None` where nobody fights.
+    pub fn rounds(&self) -> Option<&Rounds> {
+        self.rounds.as_ref()
+    }
+
     /// The surfaces of the arena.
     pub fn materials(&self) -> &Materials {
         &self.materials
@@ -217,6 +258,8 @@ impl Arena {
             self.apply(command);
         }
         self.commands = commands;
+        // What the engine refuses now it may take in the next tick.
+        let _refused = self.fill_places();
     }
 
     /// Stage 2: finds the contacts of this tick.

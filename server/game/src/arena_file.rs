@@ -5,6 +5,7 @@
 //!
 //! Every key is described, with unit and range, in `configs/arenas/proving-ground.toml`.
 
+mod ai;
 mod block;
 mod checks;
 mod key;
@@ -20,6 +21,7 @@ use std::collections::BTreeMap;
 
 use pita_sim::SimError;
 
+pub use ai::{AiFile, DriverFile};
 pub use block::Block;
 pub use checks::ACTORS_MAX;
 pub use key::Key;
@@ -28,7 +30,7 @@ pub use parameters::{ParameterFile, with_parameters};
 pub use shape::{Angles, ShapeFile};
 pub use sleep::SleepFile;
 pub use solver::SolverFile;
-pub use tables::{ActorFile, ArenaFile, BoundsFile, DriverFile, RouteFile, SpawnFile, SpawnGridFile, StaticFile};
+pub use tables::{ActorFile, ArenaFile, BoundsFile, RouteFile, SpawnFile, SpawnGridFile, StaticFile};
 
 /// Longest arena file, bytes: a bound on what reading it can cost.
 pub const FILE_MAX: usize = 1 << 20;

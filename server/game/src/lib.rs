@@ -1,7 +1,8 @@
 //! PITA's game: arenas and actors on the engine, and the pipeline that runs them.
 //!
 //! Owns: the five stages of a tick ([`pipeline`]), arenas and their files ([`arena`], [`arena_file`]), what acts in them
-//! ([`actor`], [`step`], [`kinds`], [`part`], [`vehicle`], [`prop`], [`sheep`], [`tornado`], [`driver`]), and the controls that players send ([`controls`]). It may touch the
+//! ([`actor`], [`step`], [`kinds`], [`part`], [`vehicle`], [`prop`], [`sheep`], [`tornado`], [`driver`], [`combat`]), and the
+//! controls that players send ([`controls`]). It may touch the
 //! engine, `pita-sim`, and nothing else: no clock, no disk, no network, no randomness. What a tick needs from outside
 //! comes in through [`Ports`].
 //!
@@ -14,6 +15,7 @@ pub mod arena;
 pub mod arena_file;
 pub mod assembly;
 pub mod breakable;
+pub mod combat;
 pub mod controls;
 pub mod driver;
 pub mod free_form;

@@ -39,7 +39,13 @@ pub enum Message {
     Damage {
         /// How much, in points of health.
         amount: f64,
+        /// Whose merit it is: who fired, as a rule.
+        by: Option<u32>,
     },
+    /// A round of combat is over; the arena tells everybody.
+    RoundEnded,
+    /// A round of combat begins; the arena tells everybody.
+    RoundBegan,
     /// What a game's own actors have to say; they agree on what it means.
     Own {
         /// Names the meaning.
@@ -72,6 +78,8 @@ pub(crate) enum Request {
     Add { id: u32, build: Box<Build> },
     Remove(u32),
     Tell { from: u32, to: u32, message: Message },
+    Respawn(u32),
+    KnockedOut { actor: u32, by: Option<u32> },
     Effect(Effect),
 }
 
@@ -174,6 +182,16 @@ impl<'a> Step<'a> {
     /// Tells actor `to` something; it hears it at the end of this stage, [`Actor::hear`].
     pub fn tell(&mut self, to: u32, message: Message) {
         self.requests.push(Request::Tell { from: self.id, to, message });
+    }
+
+    /// Asks that this actor be put to where it goes when it is lost, [`Actor::when_lost`].
+    pub fn respawn(&mut self) {
+        self.requests.push(Request::Respawn(self.id));
+    }
+
+    /// Tells the arena that this actor is knocked out, and whose merit that is.
+    pub fn knocked_out(&mut self, by: Option<u32>) {
+        self.requests.push(Request::KnockedOut { actor: self.id, by });
     }
 
     /// Lets players see or hear something.

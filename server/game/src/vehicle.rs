@@ -16,9 +16,10 @@ use glam::DVec3;
 use pita_sim::{AxleControl, BodyId, Motor, Phase, SimError, World};
 
 use crate::actor::{Actor, ActorInfo, Contact, Response, WhenLost};
+use crate::combat::{CombatParameters, Fighter, Muzzle};
 use crate::driver::{Driver, Motion};
 use crate::rehearsal::Memory;
-use crate::step::Step;
+use crate::step::{Message, Step};
 use crate::{Controls, Pose};
 use brakes::Braking;
 use drive_train::DriveTrain;
@@ -37,6 +38,9 @@ const RESET_SPEED_MAX: f64 = 3.0;
 /// Time between two resets of a car, s.
 const RESET_REST: f64 = 2.0;
 
+/// Speed at which a car that is knocked out goes up, m/s.
+const KNOCK_OUT_HOP: f64 = 6.0;
+
 /// A car with its driver.
 pub struct Vehicle {
     info: ActorInfo,
@@ -48,6 +52,8 @@ pub struct Vehicle {
     drive_train: DriveTrain,
     stunts: Stunts,
     touches: Touches,
+    /// `None` where nobody fights.
+    fighter: Option<Fighter>,
     reset_was_held: bool,
     /// Time until the reset button works again, s.
     reset_rest: f64,
@@ -78,9 +84,30 @@ impl Vehicle {
             response: Pedals::default(),
             drive_train: DriveTrain::default(),
             touches: Touches::default(),
+            fighter: None,
             reset_was_held: false,
             reset_rest: 0.0,
         })
+    }
+
+    /// The same car, which fights where there are rules for that.
+    pub fn in_combat(self, combat: Option<CombatParameters>) -> Self {
+        Self { fighter: combat.map(Fighter::new), ..self }
+    }
+
+    /// Lets it be knocked out, come back and fire.
+    fn fight(&mut self, step: &mut Step, motion: &Motion) -> Result<(), SimError> {
+        let Some(fighter) = &mut self.fighter else { return Ok(()) };
+        let front = DVec3::X * self.parameters.chassis_half[0];
+        let (chassis, rotation, velocity) = (self.rig.chassis(), motion.rotation, motion.velocity);
+        let position = motion.position + rotation * front;
+        let muzzle = Muzzle { owner: self.info.id, chassis, front, position, rotation, velocity };
+        let was_out = fighter.is_out();
+        fighter.act(step, &self.controls, muzzle)?;
+        match fighter.is_out() && !was_out {
+            true => self.rig.kick(step.world, DVec3::Y * KNOCK_OUT_HOP, step.dt),
+            false => Ok(()),
+        }
     }
 
     /// Puts the car back on its wheels where it is, when the button goes down. Not while it still moves fast, nor again
@@ -195,6 +222,9 @@ impl Actor for Vehicle {
     }
 
     fn collide(&mut self, contact: &Contact) -> Response {
+        if let Some(fighter) = &mut self.fighter {
+            fighter.collide(contact);
+        }
         let part = self.rig.bodies().iter().position(|&body| contact.own.body == Some(body));
         if contact.phase != Phase::End && !contact.other.is_sensor {
             match part.and_then(|part| part.checked_sub(1)) {
@@ -208,8 +238,11 @@ impl Actor for Vehicle {
     fn step(&mut self, step: &mut Step) -> Result<(), SimError> {
         let chassis = self.rig.chassis();
         let motion = Motion::of(step.world, chassis).ok_or(SimError::Gone { what: "the chassis" })?;
-        if let Some(controls) = self.driver.decide(&motion, step.dt) {
+        if let Some(controls) = self.driver.decide(&motion, step) {
             self.controls = controls;
+        }
+        if self.fighter.as_ref().is_some_and(Fighter::is_out) {
+            self.controls = Controls { handbrake: true, ..Controls::default() };
         }
         self.reset_if_asked(step, &motion)?;
         let speed = motion.forward_speed();
@@ -219,7 +252,14 @@ impl Actor for Vehicle {
         let footing = self.footing(step.world);
         let (rig, parameters, controls) = (&self.rig, &self.parameters, &self.controls);
         let (world, dt, motion) = (&mut *step.world, step.dt, &motion);
-        self.stunts.act(Stage { world, rig, parameters, controls, motion, footing, dt })
+        self.stunts.act(Stage { world, rig, parameters, controls, motion, footing, dt })?;
+        self.fight(step, motion)
+    }
+
+    fn hear(&mut self, _from: u32, message: &Message) {
+        if let Some(fighter) = &mut self.fighter {
+            fighter.hear(message);
+        }
     }
 
     fn when_lost(&self) -> WhenLost {
@@ -228,6 +268,9 @@ impl Actor for Vehicle {
 
     fn place(&mut self, world: &mut World, pose: Pose) -> Result<(), SimError> {
         (self.response, self.drive_train) = (Pedals::default(), DriveTrain::default());
+        if let Some(fighter) = self.fighter.as_mut().filter(|fighter| fighter.is_out()) {
+            fighter.restore();
+        }
         self.rig.place(world, pose)
     }
 }

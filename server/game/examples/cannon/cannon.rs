@@ -120,7 +120,7 @@ impl Actor for Ball {
 
     fn step(&mut self, step: &mut Step) -> Result<(), SimError> {
         if let Some((victim, impulse)) = self.hit.take() {
-            step.tell(victim, Message::Damage { amount: HARM * impulse });
+            step.tell(victim, Message::Damage { amount: HARM * impulse, by: None });
         }
         self.ticks_left = self.ticks_left.saturating_sub(1);
         if self.ticks_left == 0 {

@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use pita_sim::{Collider, Material, Settings, Shape, SimError, StaticDesc, World};
 
+use super::cast::Cast;
 use super::placing::Placed;
+use super::rounds::Rounds;
 use super::{Arena, ArenaSettings, StaticInfo};
 use crate::arena_file::{ArenaError, ArenaFile, Key, Materials};
 use crate::kinds::{ActorKinds, Recipe};
@@ -67,6 +69,9 @@ impl Arena {
             owners: BTreeMap::new(),
             collisions: Vec::new(),
             vehicle: file.vehicle.clone(),
+            combat: file.combat.clone(),
+            rounds: file.combat.as_ref().map(|combat| Rounds::new(combat.round.clone())),
+            cast: Cast::new(file),
             spawns: spawn_points(file),
             actors: BTreeMap::new(),
             next_actor: 0,
@@ -123,7 +128,7 @@ impl Arena {
             let ids = self.place_driver(file, i).map_err(refused(&Key::new("drivers").index(i)))?;
             self.placed.drivers.push(ids);
         }
-        Ok(())
+        self.fill_places().map_err(refused(&Key::new("ai")))
     }
 }
 

@@ -20,6 +20,7 @@ impl Arena {
         self.step_actors();
         self.see_to_lost();
         self.grant_requests();
+        self.keep_rounds();
     }
 
     /// Whom the world lost: an actor that left the bounds, or of which the engine took a body out of the world.
@@ -115,6 +116,14 @@ impl Arena {
                 let told = self.actors.get_mut(&to).map(|actor| actor.hear(from, &message)).is_some();
                 self.logic.messages += usize::from(told);
                 told
+            }
+            Request::Respawn(id) => {
+                self.put_back(id);
+                true
+            }
+            Request::KnockedOut { actor, by } => {
+                self.knock_out(actor, by);
+                true
             }
             Request::Effect(effect) => {
                 let is_one_of_few = self.logic.effects < EFFECTS_MAX;

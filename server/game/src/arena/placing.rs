@@ -3,12 +3,10 @@
 use pita_sim::{DVec3, SimError};
 
 use super::Arena;
-use crate::actor::Actor;
 use crate::arena_file::{ArenaFile, DriverFile};
-use crate::driver::{Driver, RouteDriver};
+use crate::driver::AiDriver;
 use crate::kinds::{Recipe, Site};
 use crate::spawn::Pose;
-use crate::vehicle::{Identity, Vehicle};
 
 /// Ids of what each table of the file placed.
 #[derive(Debug, Default)]
@@ -40,11 +38,9 @@ impl Arena {
     pub(super) fn place_driver(&mut self, file: &ArenaFile, index: usize) -> Result<Vec<u32>, SimError> {
         let driver = &file.drivers[index];
         let (route, pose) = start_of(file, driver);
-        let identity = Identity { id: self.new_id(), name: driver.name.clone(), slot: None };
-        let driver = Driver::Route(RouteDriver::new(route, driver.start + 1, driver.speed));
-        let vehicle = Vehicle::add(&mut self.world, identity, self.vehicle.clone(), driver, pose)?;
-        let id = vehicle.describe().id;
-        self.add(Box::new(vehicle));
+        let ai = AiDriver::new(driver.behaviour, route, driver.start + 1, driver.speed);
+        let id = self.new_id();
+        self.add_own_car(id, driver.name.clone(), ai, pose)?;
         Ok(vec![id])
     }
 }

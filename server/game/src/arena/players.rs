@@ -29,7 +29,7 @@ impl Arena {
         let identity = Identity { id, name: name.clone(), slot: Some(slot) };
         match Vehicle::add(&mut self.world, identity, self.vehicle.clone(), Driver::Player, pose) {
             Ok(vehicle) => {
-                self.add(Box::new(vehicle));
+                self.add(Box::new(vehicle.in_combat(self.combat.clone())));
                 self.slots.insert(slot, id);
                 self.events.push(ArenaEvent::Entered { slot, name });
             }

@@ -6,11 +6,12 @@ use crate::kinds::ActorKinds;
 use crate::rehearsal::{BodyState, Memory};
 
 impl Arena {
-    /// The arena that `text` describes, without actors and drivers.
+    /// The arena that `text` describes, without actors, drivers and combat.
     pub(crate) fn without_actors(text: &str, settings: &ArenaSettings) -> Result<Self, ArenaError> {
         let mut file = ArenaFile::parse(text)?;
         file.actors.clear();
         file.drivers.clear();
+        (file.ai, file.combat) = (None, None);
         Self::from_file(&file, settings, &ActorKinds::none())
     }
 

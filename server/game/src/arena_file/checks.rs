@@ -6,8 +6,6 @@ use super::{ArenaError, ArenaFile, Key, material, meshes};
 const THINGS_MAX: usize = 4_096;
 /// Most actors of an arena, whoever adds them.
 pub const ACTORS_MAX: usize = 16_384;
-/// Most cars of the arena's own.
-const DRIVERS_MAX: usize = 256;
 /// Most corners of a route.
 const CORNERS_MAX: usize = 1_024;
 /// Farthest from the origin, m: beyond, single-precision positions on the wire lose a millimetre.
@@ -26,6 +24,7 @@ impl ArenaFile {
         self.check_bounds()?;
         material::check(&self.materials, &self.material_pairs)?;
         self.vehicle.check(&Key::new("vehicle"))?;
+        self.combat.as_ref().map_or(Ok(()), |combat| combat.check(&Key::new("combat")))?;
         self.check_statics()?;
         self.check_spawns()?;
         self.check_actors()?;
@@ -125,17 +124,7 @@ impl ArenaFile {
                 corner.iter().enumerate().try_for_each(|(j, &x)| key.index(j).number(x, -WORLD_MAX, WORLD_MAX, "m"))?;
             }
         }
-        Key::new("drivers").count(self.drivers.len(), 0, DRIVERS_MAX, "entries")?;
-        for (i, driver) in self.drivers.iter().enumerate() {
-            let key = Key::new("drivers").index(i);
-            check_text(&key.at("name"), &driver.name, 32)?;
-            key.at("speed").number(driver.speed, 1.0, 100.0, "m/s")?;
-            let Some(route) = self.routes.get(&driver.route) else {
-                return key.at("route").require(false, &driver.route, &one_of("routes", self.routes.keys()));
-            };
-            key.at("start").count(driver.start, 0, route.corners.len() - 1, "")?;
-        }
-        Ok(())
+        self.check_drivers()
     }
 
     /// # Errors
@@ -146,7 +135,7 @@ impl ArenaFile {
     }
 }
 
-fn check_text(key: &Key, text: &str, max: usize) -> Result<(), ArenaError> {
+pub(super) fn check_text(key: &Key, text: &str, max: usize) -> Result<(), ArenaError> {
     let printable = !text.trim().is_empty() && !text.chars().any(char::is_control);
     let allowed = format!("1 to {max} bytes without control characters");
     key.require(printable && text.len() <= max, format_args!("{text:?}"), &allowed)

@@ -8,7 +8,10 @@ use pita_sim::collide::TriangleMesh;
 use serde::Deserialize;
 
 use super::block::Block;
-use super::{Angles, MaterialFile, MaterialPairFile, ParameterFile, ShapeFile, SleepFile, SolverFile};
+use super::{
+    AiFile, Angles, DriverFile, MaterialFile, MaterialPairFile, ParameterFile, ShapeFile, SleepFile, SolverFile,
+};
+use crate::combat::CombatParameters;
 use crate::vehicle::VehicleParameters;
 
 /// A whole file.
@@ -62,6 +65,10 @@ pub struct ArenaFile {
     /// The arena's own cars.
     #[serde(default)]
     pub drivers: Vec<DriverFile>,
+    /// Those who fill empty places; nobody without the table.
+    pub ai: Option<AiFile>,
+    /// Health, weapons and rounds; nobody fights without the table.
+    pub combat: Option<CombatParameters>,
 }
 
 fn standard_gravity() -> f64 {
@@ -208,19 +215,4 @@ fn one_of_each() -> [usize; 3] {
 pub struct RouteFile {
     /// Its corners in x and z, m.
     pub corners: Vec<[f64; 2]>,
-}
-
-/// A car that the arena drives.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DriverFile {
-    /// What a person calls it.
-    pub name: String,
-    /// Name of its route.
-    pub route: String,
-    /// Corner at which it starts; it heads for the next.
-    #[serde(default)]
-    pub start: usize,
-    /// Wanted speed, m/s.
-    pub speed: f64,
 }

@@ -103,15 +103,15 @@ fn actors_know_of_each_other_and_tell_each_other_things() {
         assert_eq!(step.others().map(|other| other.id).collect::<Vec<_>>(), [0, 1]);
         let body = step.other(1).map(|other| other.body).unwrap();
         assert_eq!(step.owner(body).map(|other| other.id), Some(1));
-        step.tell(0, Message::Damage { amount: 7.0 });
-        step.tell(77, Message::Damage { amount: 1.0 });
+        step.tell(0, Message::Damage { amount: 7.0, by: None });
+        step.tell(77, Message::Damage { amount: 1.0, by: None });
         Ok(())
     });
     assert_eq!((near, far, teller), (0, 1, 2));
     track.tick();
     track.tick();
     assert_eq!(seen.lock().unwrap()[0], Some((near, 5.0)));
-    let damage = Message::Damage { amount: 7.0 };
+    let damage = Message::Damage { amount: 7.0, by: None };
     assert_eq!(*heard.lock().unwrap(), [(2, (teller, damage))], "heard in one tick, acted upon in the next");
     let logic = track.arena.logic();
     assert_eq!((logic.messages, logic.refused), (1, 1), "nobody has the id 77");

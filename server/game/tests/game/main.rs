@@ -4,6 +4,8 @@ mod actors;
 mod arena_files;
 mod arenas;
 mod collisions;
+mod combat;
+mod drivers;
 mod driving;
 mod examples;
 mod free_form;

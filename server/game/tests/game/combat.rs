@@ -1,0 +1,188 @@
+//! Harm, weapons, knock-outs, rounds: asked for by controls, decided here.
+
+use std::f64::consts::PI;
+
+use pita_game::{ArenaEvent, Controls};
+use pita_sim::{DQuat, DVec3};
+
+use crate::test_track::{COAST, FLAT, FULL_BRAKE, SETTINGS, TestTrack};
+
+const FIRE: Controls = Controls { fire: true, ..FULL_BRAKE };
+
+/// Two cars, `distance` m from nose to nose: slot 0 faces +x, slot 1 faces it. `combat` are keys of `[combat]`.
+fn duel(combat: &str, distance: f64) -> TestTrack {
+    let mut track = TestTrack::new(&format!("{FLAT}\n[combat]\n{combat}\n"), SETTINGS);
+    track.enter(0);
+    track.enter(1);
+    both(&mut track, 1.0, COAST);
+    let half = 0.5 * distance + 1.9;
+    let height = track.car(0).position.y;
+    track.place(0, DVec3::new(-half, height, 0.0), DQuat::IDENTITY, DVec3::ZERO);
+    track.place(1, DVec3::new(half, height, 0.0), DQuat::from_rotation_y(PI), DVec3::ZERO);
+    both(&mut track, 0.5, FULL_BRAKE);
+    track.ports.events.clear();
+    track
+}
+
+/// Slot 0 does what is said, slot 1 brakes.
+fn both(track: &mut TestTrack, seconds: f64, controls: Controls) {
+    for _ in 0..(seconds * 30.0).round() as usize {
+        track.drive(1, FULL_BRAKE);
+        track.drive(0, controls);
+        track.tick();
+    }
+}
+
+fn id(track: &TestTrack, slot: u16) -> u32 {
+    track.arena.actor_of(slot).unwrap().id
+}
+
+fn count(track: &TestTrack, is_wanted: impl Fn(&ArenaEvent) -> bool) -> usize {
+    track.ports.events.iter().filter(|event| is_wanted(event)).count()
+}
+
+fn kinds(track: &TestTrack) -> Vec<&'static str> {
+    track.arena.actors().map(|info| info.kind).collect()
+}
+
+#[test]
+fn a_glove_throws_the_victim_back_and_the_owner_too_and_is_drawn_in() {
+    let mut track = duel("weapons = [\"glove\"]", 2.0);
+    both(&mut track, 0.1, FIRE);
+    assert_eq!(kinds(&track), ["vehicle", "vehicle", "glove"]);
+    let (mut victim, mut owner) = (0.0f64, 0.0f64);
+    for _ in 0..30 {
+        both(&mut track, 1.0 / 30.0, FULL_BRAKE);
+        (victim, owner) = (victim.max(track.car(1).velocity.x), owner.min(track.car(0).velocity.x));
+    }
+    assert!(victim > 3.0, "the victim gets {victim} m/s");
+    assert!(owner < -1.0, "the owner {owner} m/s");
+    assert_eq!(kinds(&track), ["vehicle", "vehicle"], "it is drawn in");
+    both(&mut track, 10.0, FULL_BRAKE);
+    for slot in [0, 1] {
+        assert!(track.car(slot).upright() > 0.99 && track.car(slot).velocity.length() < 0.1);
+    }
+}
+
+#[test]
+fn a_saw_flies_cuts_and_vanishes() {
+    let mut track = duel("health = 10.0\nrespawn_time = 60.0\nweapons = [\"saw\"]", 15.0);
+    both(&mut track, 0.1, FIRE);
+    let saw = track.arena.actors().find(|info| info.kind == "saw").expect("it flies").parts[0].slice;
+    let slice = track.arena.world().slices().find(|slice| slice.serial == saw).unwrap();
+    assert!(slice.v[0] > 20.0 && slice.v[4] > 40.0, "{:?}", slice.v);
+    both(&mut track, 5.0, FULL_BRAKE);
+    let (shooter, victim) = (id(&track, 0), id(&track, 1));
+    let knocked_out = ArenaEvent::KnockedOut { actor: victim, by: Some(shooter) };
+    assert_eq!(count(&track, |event| *event == knocked_out), 1, "{:?}", track.ports.events);
+    assert_eq!(kinds(&track), ["vehicle", "vehicle"]);
+}
+
+#[test]
+fn a_grenade_bursts_and_throws_what_is_around() {
+    let mut track = duel("weapons = [\"grenade\"]\ngrenade.fuse = 1.0\ngrenade.speed = [9.0, 4.0]", 12.0);
+    let before = track.car(1).position;
+    both(&mut track, 0.1, FIRE);
+    let mut highest = 0.0f64;
+    for _ in 0..60 {
+        both(&mut track, 1.0 / 30.0, FULL_BRAKE);
+        highest = highest.max(track.car(1).position.y);
+    }
+    let bursts = |event: &ArenaEvent| matches!(event, ArenaEvent::Effect(effect) if effect.kind == "blast");
+    assert_eq!(count(&track, bursts), 1);
+    assert_eq!(kinds(&track), ["vehicle", "vehicle"]);
+    let moved = track.car(1).position.x - before.x;
+    assert!(highest > before.y + 0.05 && moved > 0.2, "{highest} m high, {moved} m off");
+}
+
+#[test]
+fn nothing_is_fired_faster_than_it_reloads_and_nothing_where_nobody_fights() {
+    let mut track = duel("weapons = [\"saw\"]\nsaw.reload = 1.0\nsaw.life = 60.0", 60.0);
+    both(&mut track, 2.5, FIRE);
+    assert_eq!(kinds(&track).iter().filter(|kind| **kind == "saw").count(), 3);
+    let mut peace = TestTrack::new(FLAT, SETTINGS);
+    peace.enter(0);
+    peace.run(2.0, FIRE);
+    assert_eq!(kinds(&peace), ["vehicle"]);
+    assert!(peace.arena.rounds().is_none());
+}
+
+#[test]
+fn the_next_weapon_is_taken_once_for_each_press() {
+    let mut track = duel("weapons = [\"glove\", \"saw\"]", 30.0);
+    both(&mut track, 0.5, Controls { next_weapon: true, ..COAST });
+    both(&mut track, 0.1, FIRE);
+    assert_eq!(kinds(&track), ["vehicle", "vehicle", "saw"]);
+}
+
+/// Head-on at 20 m/s both are harmed; parking is not.
+#[test]
+fn blows_harm_and_standing_does_not() {
+    let mut track = duel("health = 30.0\nrespawn_time = 60.0", 20.0);
+    both(&mut track, 5.0, COAST);
+    assert_eq!(count(&track, |event| matches!(event, ArenaEvent::KnockedOut { .. })), 0);
+    track.push(0, DVec3::X * 20.0);
+    track.push(1, DVec3::X * -20.0);
+    both(&mut track, 2.0, COAST);
+    let [a, b] = [id(&track, 0), id(&track, 1)];
+    for (actor, by) in [(a, b), (b, a)] {
+        let knocked_out = ArenaEvent::KnockedOut { actor, by: Some(by) };
+        assert_eq!(count(&track, |event| *event == knocked_out), 1, "{:?}", track.ports.events);
+    }
+}
+
+/// Out: no controls, then a new life elsewhere; in between nobody harms it again.
+#[test]
+fn who_is_knocked_out_comes_back_whole() {
+    let mut track = duel("health = 10.0\nrespawn_time = 2.0\nweapons = [\"saw\"]", 10.0);
+    let before = track.car(1).position;
+    both(&mut track, 1.5, FIRE);
+    assert!(track.car(1).position.distance(before) < 10.0);
+    both(&mut track, 3.0, FULL_BRAKE);
+    let victim = id(&track, 1);
+    assert_eq!(count(&track, |event| matches!(event, ArenaEvent::KnockedOut { actor, .. } if *actor == victim)), 1);
+    assert!(track.car(1).position.distance(before) > 10.0, "at a spawn point: {:?}", track.car(1));
+    assert!(track.car(1).upright() > 0.99 && track.car(1).velocity.length() < 0.1);
+}
+
+#[test]
+fn a_round_has_a_winner_and_the_next_one_begins_anew() {
+    let keys = "health = 10.0\nrespawn_time = 1.0\nweapons = [\"saw\"]\nround = { points = 1, pause = 2.0 }";
+    let mut track = duel(keys, 10.0);
+    both(&mut track, 1.5, FIRE);
+    let shooter = id(&track, 0);
+    let ended = ArenaEvent::RoundEnded { number: 1, winner: Some(shooter) };
+    let scored = ArenaEvent::Scored { actor: shooter, points: 1 };
+    assert_eq!([&ended, &scored].map(|wanted| count(&track, |event| event == wanted)), [1, 1]);
+    let rounds = track.arena.rounds().unwrap();
+    assert!(!rounds.is_on() && rounds.leader() == Some(shooter));
+    let saws = kinds(&track).len();
+    both(&mut track, 0.4, FIRE);
+    assert!(kinds(&track).len() <= saws, "nothing is fired between rounds");
+    both(&mut track, 3.0, COAST);
+    assert_eq!(count(&track, |event| *event == ArenaEvent::RoundBegan { number: 2 }), 1);
+    let rounds = track.arena.rounds().unwrap();
+    assert!(rounds.is_on() && rounds.number() == 2 && rounds.points().count() == 0);
+}
+
+/// A round without any points has no winner.
+#[test]
+fn a_round_ends_in_time() {
+    let mut track = duel("round = { time = 2.0, pause = 60.0 }", 20.0);
+    both(&mut track, 2.0, COAST);
+    let ended = ArenaEvent::RoundEnded { number: 1, winner: None };
+    assert!(track.ports.events.contains(&ended) || !track.arena.rounds().unwrap().is_on());
+    assert_eq!(track.arena.rounds().unwrap().leader(), None);
+}
+
+/// Who leaves while his glove is out takes it along.
+#[test]
+fn a_glove_without_its_car_is_gone() {
+    let mut track = duel("weapons = [\"glove\"]", 5.0);
+    both(&mut track, 0.1, FIRE);
+    track.leave(0);
+    for _ in 0..30 {
+        track.tick();
+    }
+    assert_eq!(kinds(&track), ["vehicle"]);
+}
