@@ -235,7 +235,15 @@ impl Answering {
             actor,
             description: description.clone(),
         };
-        reply(&self.shared, &query, self.shared.keys.join(), &JoinReply::Accepted(Box::new(accepted)));
+        let answer = JoinReply::Accepted(Box::new(accepted));
+        let (bytes, most) = (pita_protocol::encode(&answer).len(), JoinReply::MAX_BYTES);
+        if bytes > most {
+            // The session ends by its silence.
+            let reason = format!("the arena has grown to {bytes} bytes of description, at most {most} are allowed");
+            tracing::error!("slot {}: {reason}; remove actors", id.slot);
+            return self.refuse(&query, Refusal::Ended { reason });
+        }
+        reply(&self.shared, &query, self.shared.keys.join(), &answer);
     }
 
     fn refuse_pending(&mut self, id: SessionId, reason: EndReason) {

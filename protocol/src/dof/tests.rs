@@ -224,6 +224,24 @@ fn parts_add_up_to_the_whole_over_a_long_and_lossy_way() {
 }
 
 #[test]
+fn what_a_silent_receiver_costs_is_bounded() {
+    let toys = Toys::new(3, 6000);
+    let (state, mut encoder, mut decoder) = (toys.state(), Encoder::default(), Decoder::default());
+    let mut snapshots: Vec<_> = (1..30).map(|tick| (tick, encoder.encode(tick, &state, &[]))).collect();
+    assert!(encoder.remembered() < 25, "{} snapshots", encoder.remembered());
+    // One that is still remembered is as good as ever, one that is not as good as none.
+    decoder.decode(1, &snapshots.remove(0).1).unwrap();
+    encoder.acknowledge(1, 0);
+    let whole = encoder.encode(30, &state, &[]);
+    let (tick, newer) = snapshots.pop().unwrap();
+    decoder.decode(tick, &newer).unwrap();
+    encoder.acknowledge(tick, 0);
+    let small = encoder.encode(31, &state, &[]);
+    assert!(small.len() * 10 < whole.len(), "{} of {}", small.len(), whole.len());
+    assert!(decoder.decode(30, &whole).is_ok() && decoder.decode(31, &small).is_ok());
+}
+
+#[test]
 fn an_encoder_knows_what_a_receiver_lacks() {
     let (mut encoder, mut needs) = (Encoder::default(), Vec::new());
     let state = |x: f64, bodies: u32| {

@@ -16,6 +16,7 @@ mod leaving;
 mod programs;
 mod refusals;
 mod resuming;
+mod routers;
 mod run;
 
 use std::future::Future;
