@@ -21,3 +21,4 @@ mod sheep;
 mod stunts;
 mod test_track;
 mod tornado;
+mod tyres;

@@ -22,7 +22,9 @@ impl Ports for Driven {
 }
 
 fn controls(tick: u64) -> Controls {
-    Controls { throttle: 0.6, steer: if tick % 60 < 30 { 0.4 } else { -0.2 }, ..Controls::default() }
+    let steer = if tick % 60 < 30 { 0.4 } else { -0.2 };
+    let (boost, jump) = ((40..55).contains(&tick), (100..103).contains(&tick));
+    Controls { throttle: 0.5, steer, boost, jump, ..Controls::default() }
 }
 
 fn car(arena: &Arena) -> Vec<BodyState> {
