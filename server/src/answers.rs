@@ -129,7 +129,7 @@ impl Answering {
             Question::Join => self.join(query),
             Question::Say => self.say(&query),
             Question::Describe => reply(shared, &query, shared.keys.describe(), &*shared.description()),
-            Question::Source => reply(shared, &query, shared.keys.source(), &shared.source),
+            Question::Source => reply(shared, &query, shared.keys.source(), &*shared.source()),
             Question::Status => reply(shared, &query, shared.keys.status(), &metrics::status(shared)),
             Question::Ticks => match payload::<TicksRequest>(&query) {
                 Ok(request) => {

@@ -9,7 +9,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use pita_game::arena_file::{self, FILE_MAX};
-use pita_game::{ActorKinds, Arena, ArenaError, ArenaSettings, Supplies};
+use pita_game::{ActorKinds, Arena, ArenaError, ArenaSettings, Reload, ReloadError, Supplies};
 use pita_sim::geometry::FILE_MAX as GEOMETRY_MAX;
 
 /// Names and texts of the compiled-in arenas; the first is the default.
@@ -38,6 +38,14 @@ pub enum SourceError {
         file: String,
         /// Key, value and allowed range.
         reason: ArenaError,
+    },
+    /// The file cannot take the place of what runs.
+    #[error("{file}: {reason}")]
+    Unchangeable {
+        /// The file.
+        file: String,
+        /// What is wrong with it, or what cannot change.
+        reason: ReloadError,
     },
 }
 
@@ -87,12 +95,25 @@ impl ArenaText {
     /// # Errors
     /// [`SourceError::Invalid`].
     pub fn build(&self, settings: &ArenaSettings) -> Result<Arena, SourceError> {
-        let read = |name: &str| match &self.folder {
+        let supplies = Supplies { kinds: &ActorKinds::built_in(), read: &|name| self.read(name) };
+        Arena::from_toml_with(&self.text, settings, &supplies).map_err(|reason| self.invalid(reason))
+    }
+
+    /// What takes a running arena of the text `old` to this one.
+    ///
+    /// # Errors
+    /// [`SourceError::Unchangeable`].
+    pub fn change_from(&self, old: &str, settings: &ArenaSettings) -> Result<Reload, SourceError> {
+        let supplies = Supplies { kinds: &ActorKinds::built_in(), read: &|name| self.read(name) };
+        Reload::between(old, &self.text, settings, &supplies)
+            .map_err(|reason| SourceError::Unchangeable { file: self.label.clone(), reason })
+    }
+
+    fn read(&self, name: &str) -> Result<Vec<u8>, String> {
+        match &self.folder {
             Some(folder) => read_beside(folder, name).map_err(|reason| reason.to_string()),
             None => Err("a built-in arena has no folder".to_owned()),
-        };
-        let supplies = Supplies { kinds: &ActorKinds::built_in(), read: &read };
-        Arena::from_toml_with(&self.text, settings, &supplies).map_err(|reason| self.invalid(reason))
+        }
     }
 
     fn invalid(&self, reason: ArenaError) -> SourceError {

@@ -1,5 +1,6 @@
 //! `pita-server run`: puts the parts together, watches over them, and ends them in order.
 
+mod reload;
 mod serve;
 
 use std::io::IsTerminal;
@@ -7,7 +8,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
-use pita_game::{Arena, ArenaSettings};
+use pita_game::Arena;
 use pita_protocol::Keys;
 use pita_protocol::message::ArenaSource;
 use tokio::signal::unix::{Signal, SignalKind, signal};
@@ -108,7 +109,7 @@ fn configure(args: &RunArgs) -> Result<Configured, DaemonError> {
     if let Some(rate) = args.tick_hz {
         config.tick.tick_hz = rate;
     }
-    let settings = ArenaSettings { tick_hz: config.tick.tick_hz.hz(), threads: config.arena.threads.get() as usize };
+    let settings = reload::settings(&config);
     let text = ArenaText::find(&config.arena.source, &config.arena.parameters)?;
     let arena = text.build(&settings)?;
     Ok(Configured { config, arena, source: text.text })
@@ -169,7 +170,7 @@ fn share(config: &ServerConfig, arena: &Arena, source: String, clock: Clock) -> 
     }))
 }
 
-/// Prints a status line every few seconds until a signal comes or a thread ends.
+/// Prints a status line every few seconds, and reads the arena again on SIGHUP, until a signal comes or a thread ends.
 async fn watch(
     config: &ServerConfig,
     shared: &Shared,
@@ -180,6 +181,7 @@ async fn watch(
     let period = Duration::from_secs(config.report.status_line_s.get().into());
     let mut lines = tokio::time::interval_at(tokio::time::Instant::now() + period, period);
     lines.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    let mut hangup = signal(SignalKind::hangup())?;
     let mut told = Troubles::default();
     loop {
         tokio::select! {
@@ -188,6 +190,10 @@ async fn watch(
                 let now = Troubles::of(shared);
                 report::trouble(&told, &now, config.tick.when_behind).iter().for_each(|line| out.print(line));
                 told = now;
+            }
+            _ = hangup.recv() => {
+                let said = tokio::task::block_in_place(|| reload::reload(config, shared));
+                said.iter().for_each(|line| out.print(line));
             }
             name = serving.thread_ended() => return Err(DaemonError::ThreadEnded(name)),
             // An error would be the end of the task that watches, which ends with the process only.

@@ -1,6 +1,6 @@
 //! What the daemon's threads share.
 //!
-//! The tick thread touches the lock-free parts only: [`Shared::inputs`], [`Shared::boarding`], [`Shared::frames`],
+//! The tick thread touches the lock-free parts only: [`Shared::inputs`], [`Shared::boarding`], [`Shared::frames`], [`Shared::reloads`],
 //! the counters and [`Shared::phase`]. The locks belong to the network's threads, the publishing thread and the
 //! answering thread; nobody holds one while talking to Zenoh.
 
@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::Thread;
 
 use crossbeam_queue::ArrayQueue;
+use pita_game::Reload;
 use pita_protocol::Keys;
 use pita_protocol::message::{ArenaSource, Description};
 
@@ -32,8 +33,8 @@ pub struct Shared {
     pub input_timeout_ms: u32,
     /// What was sent, received and refused.
     pub counters: Counters,
-    /// The arena's file.
-    pub source: ArenaSource,
+    /// What changes in the arena: daemon to tick thread.
+    pub reloads: ArrayQueue<Reload>,
     /// Network to tick thread.
     pub inputs: InputQueue,
     /// Publishing thread to tick thread, in order.
@@ -43,9 +44,13 @@ pub struct Shared {
     sessions: Mutex<Sessions>,
     metrics: Mutex<Metrics>,
     description: Mutex<Arc<Description>>,
+    source: Mutex<Arc<ArenaSource>>,
     publisher: OnceLock<Thread>,
     phase: AtomicU8,
 }
+
+/// Changes of the arena that may wait for a tick.
+const RELOADS: usize = 4;
 
 /// The daemon's life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,13 +94,14 @@ impl Shared {
             tick_hz: start.tick_hz,
             input_timeout_ms: start.input_timeout_ms,
             counters: Counters::default(),
-            source: start.source,
+            reloads: ArrayQueue::new(RELOADS),
             inputs: InputQueue::new(start.inputs_max),
             boarding,
             frames: FramePool::new(),
             sessions: Mutex::new(start.sessions),
             metrics: Mutex::new(Metrics::new(start.tick_hz)),
             description: Mutex::new(Arc::new(start.description)),
+            source: Mutex::new(Arc::new(start.source)),
             publisher: OnceLock::new(),
             phase: AtomicU8::new(Phase::Running as u8),
         }
@@ -119,6 +125,16 @@ impl Shared {
     /// Replaces [`Shared::description`].
     pub fn set_description(&self, description: Arc<Description>) {
         *lock(&self.description) = description;
+    }
+
+    /// The arena's file. Not for the tick thread.
+    pub fn source(&self) -> Arc<ArenaSource> {
+        lock(&self.source).clone()
+    }
+
+    /// Replaces [`Shared::source`].
+    pub fn set_source(&self, source: ArenaSource) {
+        *lock(&self.source) = Arc::new(source);
     }
 
     /// The calling thread is the one that [`Shared::wake_publisher`] wakes.

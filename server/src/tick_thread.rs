@@ -25,6 +25,9 @@ pub fn run(mut arena: Arena, drivers: Drivers, mut pacer: Pacer, shared: Arc<Sha
         let now_ns = outside.wait_until(pacer.due_ns());
         let begin = pacer.begin(now_ns);
         outside.begin_tick(begin.skipped, begin.late_ns, now_ns);
+        if let Some(reload) = outside.shared.reloads.pop() {
+            arena.schedule(reload);
+        }
         pipeline::tick(&mut arena, &mut outside);
         pacer.end(outside.shared.clock.ns());
         outside.hand_over(&pacer);

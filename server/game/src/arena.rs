@@ -168,8 +168,8 @@ pub struct Arena {
     logic: LogicReport,
     /// What the file placed.
     placed: Placed,
-    /// What the coming tick changes about that.
-    reload: Option<Box<Reload>>,
+    /// What the coming tick changes about that, in order.
+    reloads: Vec<Reload>,
     /// Likewise: collisions of this tick.
     collisions: Vec<Collision>,
 }
@@ -251,7 +251,7 @@ impl Arena {
     /// Stage 1: takes the commands that came in since the last tick and applies them.
     pub(crate) fn collect_input(&mut self, ports: &mut impl Ports) {
         self.events.clear();
-        self.reload_if_scheduled();
+        self.do_reloads();
         let mut commands = std::mem::take(&mut self.commands);
         ports.collect(self.ticks + 1, &mut commands);
         for command in commands.drain(..) {

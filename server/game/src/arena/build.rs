@@ -83,7 +83,7 @@ impl Arena {
             requests: Vec::new(),
             logic: LogicReport::default(),
             placed: Placed::default(),
-            reload: None,
+            reloads: Vec::new(),
         };
         arena.set_material_pairs(file)?;
         arena.add_statics(file)?;

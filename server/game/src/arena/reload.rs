@@ -77,15 +77,18 @@ impl Reload {
 }
 
 impl Arena {
-    /// From the coming tick on the arena is as `reload` has it. A second one before that takes the first one's place.
-    pub fn schedule(&mut self, reload: Box<Reload>) {
-        self.reload = Some(reload);
+    /// From the coming tick on the arena is as `reload` has it. What is scheduled before that is done first: a reload is
+    /// between the text that those before it left and the next.
+    pub fn schedule(&mut self, reload: Reload) {
+        self.reloads.push(reload);
     }
 
     /// Stage 1, before commands: does what was scheduled.
-    pub(super) fn reload_if_scheduled(&mut self) {
-        let Some(reload) = self.reload.take() else { return };
-        let Reload { file, recipes, actors, drivers, .. } = *reload;
+    pub(super) fn do_reloads(&mut self) {
+        std::mem::take(&mut self.reloads).into_iter().for_each(|reload| self.do_reload(reload));
+    }
+
+    fn do_reload(&mut self, Reload { file, recipes, actors, drivers, .. }: Reload) {
         let old = std::mem::take(&mut self.placed);
         self.remove_unless_kept(&old.actors, &actors);
         self.remove_unless_kept(&old.drivers, &drivers);

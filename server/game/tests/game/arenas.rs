@@ -44,6 +44,17 @@ fn shipped_arenas_live_by_themselves() {
     }
 }
 
+/// Ten minutes of each, twice: `cargo test -p pita-game --test game --release -- --ignored ten_minutes`.
+#[test]
+#[ignore = "takes minutes"]
+fn shipped_arenas_live_for_ten_minutes() {
+    for (name, text) in ARENAS {
+        let first = run(name, text, 600, &SETTINGS);
+        println!("{name}: {first:016x}");
+        assert_eq!(first, run(name, text, 600, &SETTINGS), "{name}, twice");
+    }
+}
+
 #[test]
 fn the_stress_arena_is_as_large_as_it_is_asked_to_be() {
     let (_, text) = ARENAS[3];

@@ -28,7 +28,7 @@ fn actors_change_under_players_who_stay() {
     assert_eq!(ids(&track, "crate"), [0, 1]);
     let reload = between(&old, &new).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(reload.changes(), ["actors: 1 tables as they were, 1 built anew"]);
-    track.arena.schedule(Box::new(reload));
+    track.arena.schedule(reload);
     track.tick();
     assert_eq!(ids(&track, "vehicle"), cars);
     assert!(track.car(0).position.distance(car.position) < 1.0, "the player drives on");
@@ -38,7 +38,7 @@ fn actors_change_under_players_who_stay() {
     let at = track.arena.world().position(track.arena.actor(crates[1]).unwrap().bodies()[0]).unwrap();
     assert!((at.x - 30.0).abs() < 0.01, "{at}");
     // And back again, from where it is now.
-    track.arena.schedule(Box::new(between(&new, &old).unwrap_or_else(|error| panic!("{error}"))));
+    track.arena.schedule(between(&new, &old).unwrap_or_else(|error| panic!("{error}")));
     track.tick();
     assert_eq!((ids(&track, "crate").len(), track.arena.world().body_count()), (2, 7));
 }
@@ -61,7 +61,7 @@ fn new_cars_have_the_new_parameters() {
     track.enter(0);
     track.tick();
     let new = format!("{FLAT}\n[vehicle]\nchassis_mass = 2000.0\n");
-    track.arena.schedule(Box::new(between(FLAT, &new).unwrap_or_else(|error| panic!("{error}"))));
+    track.arena.schedule(between(FLAT, &new).unwrap_or_else(|error| panic!("{error}")));
     track.enter(1);
     track.tick();
     let mass = |slot| {

@@ -1,0 +1,37 @@
+//! The arena's file is read again while it runs, on SIGHUP.
+//!
+//! Everything that can fail is done here; the tick thread is handed what changes nothing or everything.
+
+use pita_game::ArenaSettings;
+use pita_protocol::message::ArenaSource;
+
+use crate::arena_source::{ArenaText, SourceError};
+use crate::config::ServerConfig;
+use crate::shared::Shared;
+
+/// The settings of the arena that `config` asks for.
+pub fn settings(config: &ServerConfig) -> ArenaSettings {
+    ArenaSettings { tick_hz: config.tick.tick_hz.hz(), threads: config.arena.threads.get() as usize }
+}
+
+/// Reads the arena again; answers what to tell who asked for it.
+pub fn reload(config: &ServerConfig, shared: &Shared) -> Vec<String> {
+    match change(config, shared) {
+        Ok(changes) if changes.is_empty() => vec!["Arena: read again, nothing changed.".to_owned()],
+        Ok(changes) => changes.iter().map(|change| format!("Arena: {change}")).collect(),
+        Err(error) => vec![format!("Arena: goes on as it is. {error}")],
+    }
+}
+
+fn change(config: &ServerConfig, shared: &Shared) -> Result<Vec<String>, SourceError> {
+    let new = ArenaText::find(&config.arena.source, &config.arena.parameters)?;
+    let reload = new.change_from(&shared.source().toml, &settings(config))?;
+    let changes = reload.changes();
+    // Refused only where the tick thread stands still: then nothing changed.
+    if shared.reloads.push(reload).is_err() {
+        return Ok(vec!["nothing changed: earlier changes still wait for a tick; ask again".to_owned()]);
+    }
+    // Whoever joins now may get the new text a tick before the new arena, which predicts his car no worse.
+    shared.set_source(ArenaSource { toml: new.text });
+    Ok(changes)
+}
