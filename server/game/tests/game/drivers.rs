@@ -123,3 +123,24 @@ fn a_minute_of_hunters_is_the_same_twice() {
     assert_eq!(first, second);
     eprintln!("{} knock-outs", first.1);
 }
+
+/// The desert town as it is shipped: nobody plays, and there is something to see.
+#[test]
+fn a_minute_in_the_desert_town_is_a_fight() {
+    let mut track = TestTrack::new(include_str!("../../../../configs/arenas/desert-town.toml"), SETTINGS);
+    for tick in 0..60 * 30 {
+        track.tick();
+        let world = track.arena.world();
+        assert_eq!(world.report().quarantined, 0, "tick {tick}");
+        let vehicles = track.arena.actors().filter(|info| info.kind == "vehicle");
+        let chassis: Vec<u32> = vehicles.map(|info| info.parts[0].slice).collect();
+        for slice in world.slices().filter(|slice| chassis.contains(&slice.serial)) {
+            let speed = slice.v[..3].iter().map(|v| v * v).sum::<f64>().sqrt();
+            assert!(speed < 60.0, "tick {tick}: {speed} m/s");
+        }
+    }
+    let is_weapon = |event: &&ArenaEvent| matches!(event, ArenaEvent::ActorAdded(info) if pita_game::combat::Weapon::is_kind(info.kind));
+    let shots = track.ports.events.iter().filter(is_weapon).count();
+    let knock_outs = track.ports.events.iter().filter(|e| matches!(e, ArenaEvent::KnockedOut { .. })).count();
+    assert!(shots > 5 && knock_outs > 2, "{shots} shots, {knock_outs} knock-outs");
+}
