@@ -110,6 +110,12 @@ impl Meeting<'_> {
         normal.dot(velocity(self.a) - self.b.map_or(DVec3::ZERO, velocity))
     }
 
+    /// By how much the gap at `position` along `normal` closes in the tick if nothing but gravity acts, m.
+    pub fn closes(&self, position: DVec3, normal: DVec3, settings: &Settings) -> f64 {
+        let fall = if self.b.is_none() { settings.gravity * settings.dt } else { DVec3::ZERO };
+        settings.dt * (self.closing_speed(position, normal) + normal.dot(fall))
+    }
+
     /// The closest of `points` where they touch; `touched` says that they did in the last tick.
     pub fn closest(&self, points: &[ContactPoint], touched: bool, settings: &Settings) -> Option<Closest> {
         let fall = if self.b.is_none() { settings.gravity * settings.dt } else { DVec3::ZERO };

@@ -11,6 +11,9 @@ use crate::dof::{Body, BodyId, Placed, Pose, Twist};
 use crate::settings::Settings;
 use crate::state::State;
 
+/// How far off a straight line a tick may move what goes round, m.
+const STRAIGHT: f64 = 1e-3;
+
 /// Where detection looks bodies up.
 #[derive(Clone, Copy)]
 pub(crate) struct Bodies<'a> {
@@ -53,6 +56,8 @@ pub(super) struct Hull {
     twist: Twist,
     /// How much faster than its twist says its surface may be, m/s.
     spread: f64,
+    /// Whether it goes on as its twist says as long as nothing touches it.
+    flies: bool,
     /// Of the hull and of all that a tick may do to it; empty where the body takes no part.
     pub bounds: Bound,
     /// How the tick moves it, as far as the second look asks.
@@ -72,8 +77,8 @@ pub(super) struct Stride {
 
 impl Hull {
     pub fn new(placed: Placed, owner: u32) -> Self {
-        let (pose, twist, spread, bounds) = (Pose::IDENTITY, Twist::REST, 0.0, Bound::EMPTY);
-        Self { placed, owner, pose, twist, spread, bounds, stride: Stride::default(), deformed: None }
+        let (pose, twist, spread, flies, bounds) = (Pose::IDENTITY, Twist::REST, 0.0, false, Bound::EMPTY);
+        Self { placed, owner, pose, twist, spread, flies, bounds, stride: Stride::default(), deformed: None }
     }
 
     /// Takes over where its body is now.
@@ -89,6 +94,9 @@ impl Hull {
                     deformed.follow(hull, figure, state);
             }
         }
+        // A piece of a compound goes round the centre of mass.
+        let lever = self.placed.at.point.length() * (settings.dt * self.twist.angular.length()).powi(2) / 2.0;
+        self.flies = body.figure.is_none() && lever < STRAIGHT;
         if let Some(collider) = self.collider(bodies) {
             self.bounds = swept_bounds(&self.seen(collider), settings);
         }
@@ -113,8 +121,8 @@ impl Hull {
     }
 
     fn seen<'a>(&self, collider: &'a Collider) -> Moving<'a> {
-        let Self { placed: Placed { serial, .. }, owner, pose, twist, spread, .. } = *self;
-        Moving { serial, owner, collider, pose, twist, spread }
+        let Self { placed: Placed { serial, .. }, owner, pose, twist, spread, flies, .. } = *self;
+        Moving { serial, owner, collider, pose, twist, spread, flies }
     }
 }
 

@@ -20,6 +20,7 @@ pub mod kdop_tree;
 mod manifold;
 mod material;
 mod narrow_phase;
+mod passing;
 mod patches;
 mod proximity;
 mod query;
@@ -108,6 +109,8 @@ pub(crate) struct Moving<'a> {
     pub twist: Twist,
     /// How much faster than its twist says its surface may be where it deforms, m/s.
     pub spread: f64,
+    /// Whether it goes on as its twist says as long as nothing touches it.
+    pub flies: bool,
 }
 
 /// The second half of a pair: another body or a piece of static geometry.

@@ -12,6 +12,7 @@ use super::collision::{Closest, Meeting, Phase, Touch};
 use super::convex::{Finder, NAMELESS};
 use super::half_space;
 use super::manifold::{Manifold, ManifoldPoint, POINTS_MAX};
+use super::passing::{passes, spin_across};
 use super::patches::{PATCHES_MAX, Patches};
 use super::proximity::Proximity;
 use super::shape::{Collider, Shape};
@@ -94,6 +95,7 @@ pub(super) struct NarrowPhase {
     spare: Vec<u32>,
     finder: Finder,
     manifold: Manifold,
+    passing: Manifold,
     patches: Patches,
     /// Points of a pair's last tick that this tick has not taken over.
     old: Vec<ContactPoint>,
@@ -149,6 +151,7 @@ impl NarrowPhase {
         let key = (a.serial, Partner::Body(b.serial));
         let pair = self.take(key, 0, a.collider.is_sensor() || b.collider.is_sensor(), settings);
         self.convex(pair, (a.collider, a.pose), (b.collider, b.pose), margin);
+        self.let_pass(a, Ok(b), settings);
         self.update(key, pair, &Meeting { a, b: Some(b), surface }, settings);
         let pair = &self.memory[pair];
         !pair.is_sensor && !pair.points.is_empty()
@@ -185,6 +188,7 @@ impl NarrowPhase {
         }
         let pair = self.take(key, 0, is_sensor, settings);
         self.convex(pair, (a.collider, a.pose), (piece, pose), margin);
+        self.let_pass(a, Err((piece, pose)), settings);
         self.update(key, pair, &meeting, settings);
     }
 
@@ -287,6 +291,14 @@ impl NarrowPhase {
         }
     }
 
+    /// Drops the points of what only passes.
+    fn let_pass(&mut self, a: &Moving, b: Result<&Moving, (&Collider, Pose)>, settings: &Settings) {
+        let Self { manifold, finder, passing, .. } = self;
+        if !manifold.reduced().is_empty() && passes(a, b, manifold, finder, passing, settings) {
+            manifold.clear();
+        }
+    }
+
     /// Contacts with a surface of triangles: a place in memory for every patch, and what is told of the pair at the first.
     fn surface(
         &mut self,
@@ -382,12 +394,6 @@ fn margin(speed: f64, reach: f64, settings: &Settings) -> f64 {
 
 /// How far a point of the body's surface may get in a tick by turning and deforming, m.
 fn reach(body: &Moving, settings: &Settings) -> f64 {
-    // A surface of revolution stays where it is however fast it spins about its axis.
-    let spin = body.twist.angular;
-    let across = match (body.collider.shape(), body.collider.shape().revolution_axis()) {
-        (Shape::Ball { .. }, _) => DVec3::ZERO,
-        (_, Some(axis)) => spin.reject_from_normalized(body.pose.rotation * axis),
-        _ => spin,
-    };
+    let across = spin_across(body);
     (settings.dt * across.length()).min(2.0) * body.collider.bounding_radius() + settings.dt * body.spread
 }

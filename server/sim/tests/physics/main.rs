@@ -18,6 +18,7 @@ mod hostile;
 mod joints;
 mod lattice;
 mod natural;
+mod near_misses;
 mod over_determined;
 mod own_kind;
 mod potentials;
