@@ -2,6 +2,7 @@
 
 mod absurd;
 mod articulated;
+mod bad_geometry;
 mod closed_form;
 mod collisions;
 mod compounds;
