@@ -8,6 +8,9 @@ use crate::driver::AiDriver;
 use crate::kinds::{Recipe, Site};
 use crate::spawn::Pose;
 
+/// Most bodies that the actors of a file may have: kinds multiply copies by bodies of their own.
+const BODIES_MAX: usize = 65_536;
+
 /// Ids of what each table of the file placed.
 #[derive(Debug, Default)]
 pub(super) struct Placed {
@@ -25,6 +28,9 @@ impl Arena {
     ) -> Result<Vec<u32>, SimError> {
         let actor = &file.actors[index];
         let place = |position| {
+            if self.world.body_count() >= BODIES_MAX {
+                return Err(SimError::Unusable { what: "the actors of an arena have at most 65536 bodies in all" });
+            }
             let (id, pose) = (self.new_id(), Pose { position, yaw: actor.yaw.to_radians() });
             let (world, materials, name) = (&mut self.world, &self.materials, actor.name());
             let added = recipe(&mut Site { world, id, name, pose, file, materials })?;

@@ -179,6 +179,10 @@ const BAD_ADDITIONS: &[(&str, &[&str])] = &[
         "[[actors]]\nkind = \"prop\"\nshape.ball.radius = 1\nmaterial = \"asphalt\"\nmass = 1\nposition = [0, 0, 0]\ncopies = [4096, 4096, 4096]",
         &["actors[0].copies is 68719476736", "1 to 16384 actors in all"],
     ),
+    (
+        "[[actors]]\nkind = \"fence\"\nmaterial = \"asphalt\"\nboards = 64\nposition = [0, 0, 0]\ncopies = [1, 1, 1100]",
+        &["actors[0]", "at most 65536 bodies"],
+    ),
     ("[[actors]]\nkind = \"unicorn\"\nposition = [0, 0, 0]", &["actors[0].kind is unicorn", "one of", "prop"]),
     (
         "[[actors]]\nkind = \"prop\"\nposition = [0, 0, 0]\nshape.ball.radius = 1\nmaterial = \"asphalt\"\nmass = 1\nwings = 2",

@@ -44,15 +44,36 @@ fn shipped_arenas_live_by_themselves() {
     }
 }
 
-/// Ten minutes of each, twice: `cargo test -p pita-game --test game --release -- --ignored ten_minutes`.
+/// Ten minutes of an arena, twice: `cargo test -p pita-game --test game --release -- --ignored --nocapture ten_minutes`.
+fn ten_minutes_of(arena: usize) {
+    let (name, text) = ARENAS[arena];
+    let first = run(name, text, 600, &SETTINGS);
+    println!("{name}: {first:016x} after ten minutes");
+    assert_eq!(first, run(name, text, 600, &SETTINGS), "{name}, twice");
+}
+
 #[test]
 #[ignore = "takes minutes"]
-fn shipped_arenas_live_for_ten_minutes() {
-    for (name, text) in ARENAS {
-        let first = run(name, text, 600, &SETTINGS);
-        println!("{name}: {first:016x}");
-        assert_eq!(first, run(name, text, 600, &SETTINGS), "{name}, twice");
-    }
+fn ten_minutes_of_the_proving_ground() {
+    ten_minutes_of(0);
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn ten_minutes_of_the_desert_town() {
+    ten_minutes_of(1);
+}
+
+#[test]
+#[ignore = "takes many minutes"]
+fn ten_minutes_of_the_sheep_pasture() {
+    ten_minutes_of(2);
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn ten_minutes_of_the_stress_arena() {
+    ten_minutes_of(3);
 }
 
 #[test]
