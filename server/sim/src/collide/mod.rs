@@ -26,6 +26,7 @@ mod proximity;
 mod query;
 mod second_look;
 mod shape;
+mod still;
 mod trees;
 mod triangle_mesh;
 

@@ -16,6 +16,7 @@ use super::passing::{passes, spin_across};
 use super::patches::{PATCHES_MAX, Patches};
 use super::proximity::Proximity;
 use super::shape::{Collider, Shape};
+use super::still::Still;
 use super::triangle_mesh::TriangleMesh;
 use super::{ContactPoint, Moving, Partner, Surface};
 use crate::dof::Pose;
@@ -29,6 +30,8 @@ struct Pair {
     points: ArrayVec<ContactPoint, POINTS_MAX>,
     /// Last normal in the axes of the first shape's core.
     normal: Option<DVec3>,
+    /// What was found of it when it was last looked at.
+    still: Option<Still>,
     /// That it sees only: its points are no contacts.
     is_sensor: bool,
     /// Where it touches in this tick, and where it did in the last.
@@ -41,7 +44,8 @@ struct Pair {
 impl Pair {
     /// Nothing is known of it.
     fn new() -> Self {
-        Self { points: ArrayVec::new(), normal: None, is_sensor: false, touch: None, last_touch: None, impulse: 0.0 }
+        let (touch, last_touch, normal, still) = Default::default();
+        Self { points: ArrayVec::new(), normal, still, is_sensor: false, touch, last_touch, impulse: 0.0 }
     }
 
     /// Starts a tick.
@@ -150,7 +154,8 @@ impl NarrowPhase {
         self.manifold.clear();
         let key = (a.serial, Partner::Body(b.serial));
         let pair = self.take(key, 0, a.collider.is_sensor() || b.collider.is_sensor(), settings);
-        self.convex(pair, (a.collider, a.pose), (b.collider, b.pose), margin);
+        let deforms = a.spread > 0.0 || b.spread > 0.0;
+        self.convex(pair, (a.collider, a.pose), (b.collider, b.pose), margin, deforms);
         self.let_pass(a, Ok(b), settings);
         self.update(key, pair, &Meeting { a, b: Some(b), surface }, settings);
         let pair = &self.memory[pair];
@@ -187,7 +192,7 @@ impl NarrowPhase {
             return self.surface(key, is_sensor, (mesh, pose), margin, &meeting, settings);
         }
         let pair = self.take(key, 0, is_sensor, settings);
-        self.convex(pair, (a.collider, a.pose), (piece, pose), margin);
+        self.convex(pair, (a.collider, a.pose), (piece, pose), margin, a.spread > 0.0);
         self.let_pass(a, Err((piece, pose)), settings);
         self.update(key, pair, &meeting, settings);
     }
@@ -282,12 +287,19 @@ impl NarrowPhase {
         (manifold.normal, manifold.reduced())
     }
 
-    /// Finds the manifold of two convex shapes.
-    fn convex(&mut self, pair: usize, a: (&Collider, Pose), b: (&Collider, Pose), margin: f64) {
+    /// Finds the manifold of two convex shapes, unless they kept still; `deforms` says that one has not kept its shape.
+    fn convex(&mut self, pair: usize, a: (&Collider, Pose), b: (&Collider, Pose), margin: f64, deforms: bool) {
         let Self { memory, finder, manifold, .. } = self;
+        let (Pair { normal, still, .. }, poses) = (&mut memory[pair], [a.1, b.1]);
+        if deforms {
+            *still = None;
+        }
+        if still.as_ref().is_some_and(|still| still.carry(poses, margin, manifold)) {
+            return;
+        }
         if let (Some(a), Some(b)) = (a.0.convex(a.1), b.0.convex(b.1)) {
-            let normal = &mut memory[pair].normal;
             *normal = finder.contacts(a, b, margin, *normal, manifold);
+            *still = Some(Still::keep(manifold, poses, margin));
         }
     }
 
