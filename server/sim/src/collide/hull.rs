@@ -4,7 +4,6 @@ use glam::DMat3;
 use slotmap::SlotMap;
 
 use super::embedded_hull::{Deformed, Motion};
-use super::kdop::Kdop;
 use super::shape::{Collider, Shape};
 use super::{Bound, Moving};
 use crate::dof::{Body, BodyId, Placed, Pose, Twist};
@@ -128,24 +127,25 @@ impl Hull {
 
 /// Bounds of a shape.
 pub(super) fn bounds(shape: &Shape, pose: Pose) -> Bound {
-    let to_shape = DMat3::from_quat(pose.rotation).transpose();
-    Kdop::of_intervals(|axis| {
-        let (centre, (low, high)) = (axis.dot(pose.position), shape.interval(to_shape * axis));
-        (centre + low, centre + high)
-    })
+    let (low, high) = shape.intervals(|v| Bound::along(pose.rotation * v));
+    let centre = Bound::along(pose.position);
+    Bound { min: std::array::from_fn(|i| centre[i] + low[i]), max: std::array::from_fn(|i| centre[i] + high[i]) }
 }
 
 /// Bounds of a collider and of all that a tick may do to it.
 fn swept_bounds(hull: &Moving, settings: &Settings) -> Bound {
     let Moving { collider, pose, twist, spread, .. } = *hull;
-    let (to_shape, radius) = (DMat3::from_quat(pose.rotation).transpose(), collider.bounding_radius());
+    let (axes, radius) = (DMat3::from_quat(pose.rotation), collider.bounding_radius());
     // Turning moves no point farther than this, nor out of the ball around the shape.
     let turn = settings.dt * twist.angular.length() * radius;
     let slack = settings.contact.margin + settings.dt * (spread + settings.dt * settings.gravity.length());
-    let turned = Kdop::of_intervals(|axis| {
-        let (centre, (low, high)) = (axis.dot(pose.position), collider.shape().interval(to_shape * axis));
-        (centre + (low - turn).max(-radius).min(low) - slack, centre + (high + turn).min(radius).max(high) + slack)
-    });
+    let (low, high) = collider.shape().intervals(|v| Bound::along(axes * v));
+    let centre = Bound::along(pose.position);
+    let turned = |high: f64| (high + turn).min(radius).max(high) + slack;
+    let turned = Bound {
+        min: std::array::from_fn(|i| centre[i] - turned(-low[i])),
+        max: std::array::from_fn(|i| centre[i] + turned(high[i])),
+    };
     turned.swept(settings.dt * twist.linear)
 }
 

@@ -11,6 +11,9 @@ use glam::DVec3;
 pub trait Directions<const H: usize> {
     /// The directions.
     const AXES: [DVec3; H];
+
+    /// Their x, y and z, each by itself: so laid out, products with all of them vectorise.
+    const COLUMNS: [[f64; H]; 3] = columns(&Self::AXES);
 }
 
 /// The sets of directions that there are: 3 slabs (a box), 7 (and the corners of a cube), 9 (and its edges), 13 (both).
@@ -50,6 +53,16 @@ impl Directions<9> for Slabs {
 
 impl Directions<13> for Slabs {
     const AXES: [DVec3; 13] = joined(&[&DVec3::AXES, &CORNERS, &EDGES]);
+}
+
+const fn columns<const H: usize>(axes: &[DVec3; H]) -> [[f64; H]; 3] {
+    let mut columns = [[0.0; H]; 3];
+    let mut i = 0;
+    while i < H {
+        (columns[0][i], columns[1][i], columns[2][i]) = (axes[i].x, axes[i].y, axes[i].z);
+        i += 1;
+    }
+    columns
 }
 
 /// All of `sets`, one after the other.
@@ -135,15 +148,13 @@ where
 {
     /// Where it is for all: a copy for every use costs more than what is done with it.
     const AXES: &'static [DVec3; H] = &Slabs::AXES;
+    const COLUMNS: &'static [[f64; H]; 3] = &Slabs::COLUMNS;
 
-    /// The bound of what reaches from `interval(axis).0` to `interval(axis).1` along every axis: of a support map.
+    /// Coordinates of a vector along the axes.
     #[inline]
-    pub fn of_intervals(interval: impl Fn(DVec3) -> (f64, f64)) -> Self {
-        let mut bound = Self::EMPTY;
-        for (i, &axis) in Self::AXES.iter().enumerate() {
-            (bound.min[i], bound.max[i]) = interval(axis);
-        }
-        bound
+    pub fn along(v: DVec3) -> [f64; H] {
+        let [x, y, z] = Self::COLUMNS;
+        std::array::from_fn(|i| x[i] * v.x + y[i] * v.y + z[i] * v.z)
     }
 
     /// The bound of points, deforming or not.
@@ -162,9 +173,8 @@ where
     /// What it sweeps over on a way of `displacement`, m.
     #[inline]
     pub fn swept(&self, displacement: DVec3) -> Self {
-        let mut swept = *self;
-        for (i, axis) in Self::AXES.iter().enumerate() {
-            let way = axis.dot(displacement);
+        let (mut swept, way) = (*self, Self::along(displacement));
+        for (i, way) in way.into_iter().enumerate() {
             swept.min[i] += way.min(0.0);
             swept.max[i] += way.max(0.0);
         }

@@ -122,23 +122,33 @@ impl Shape {
 
     /// Least and greatest coordinate along a unit vector in the body's frame: the support map both ways, m.
     pub(crate) fn interval(&self, direction: DVec3) -> (f64, f64) {
+        let ([low], [high]) = self.intervals(|v| [v.dot(direction)]);
+        (low, high)
+    }
+
+    /// As [`Shape::interval`], for several unit vectors at once: `along` answers the coordinates along them of a vector in
+    /// the body's frame.
+    #[inline]
+    pub(crate) fn intervals<const H: usize>(&self, along: impl Fn(DVec3) -> [f64; H]) -> ([f64; H], [f64; H]) {
         let half = match self {
-            Self::HalfSpace { .. } => f64::INFINITY,
-            Self::Ball { radius } => *radius,
-            Self::Box { half } => direction.abs().dot(*half),
-            Self::Capsule { half_length, radius } => direction.x.abs() * half_length + radius,
-            Self::Cylinder { half_length, radius, rounding } => {
-                let along = direction.z.abs();
+            Self::HalfSpace { .. } => [f64::INFINITY; H],
+            Self::Ball { radius } => [*radius; H],
+            Self::Box { half } => {
+                let [x, y, z] = DVec3::AXES.map(&along);
+                std::array::from_fn(|i| x[i].abs() * half.x + y[i].abs() * half.y + z[i].abs() * half.z)
+            }
+            Self::Capsule { half_length, radius } => along(DVec3::X).map(|x| x.abs() * half_length + radius),
+            Self::Cylinder { half_length, radius, rounding } => along(DVec3::Z).map(|along| {
                 let across = (1.0 - along * along).max(0.0).sqrt();
-                along * (half_length - rounding) + across * (radius - rounding) + rounding
-            }
+                along.abs() * (half_length - rounding) + across * (radius - rounding) + rounding
+            }),
             Self::Hull { points, radius } => {
-                let (low, high) = ends(points, direction);
-                return (low - radius, high + radius);
+                let (low, high) = ends(points, along);
+                return (low.map(|low| low - radius), high.map(|high| high + radius));
             }
-            Self::Mesh(mesh) => return ends(mesh.vertices(), direction),
+            Self::Mesh(mesh) => return ends(mesh.vertices(), along),
         };
-        (-half, half)
+        (half.map(|half| -half), half)
     }
 
     /// What is extruded, and by how much; `None` for what is not convex, or has no bounds.
@@ -171,10 +181,16 @@ fn farthest(points: &[DVec3]) -> f64 {
     points.iter().map(|p| p.length()).fold(0.0, f64::max)
 }
 
-/// Least and greatest coordinate of points along a direction, m.
-fn ends(points: &[DVec3], direction: DVec3) -> (f64, f64) {
-    let heights = points.iter().map(|p| p.dot(direction));
-    heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+/// Least and greatest coordinates of points, m.
+fn ends<const H: usize>(points: &[DVec3], along: impl Fn(DVec3) -> [f64; H]) -> ([f64; H], [f64; H]) {
+    let (mut low, mut high) = ([f64::INFINITY; H], [f64::NEG_INFINITY; H]);
+    for at in points.iter().map(|&point| along(point)) {
+        for i in 0..H {
+            low[i] = if at[i] < low[i] { at[i] } else { low[i] };
+            high[i] = if at[i] > high[i] { at[i] } else { high[i] };
+        }
+    }
+    (low, high)
 }
 
 const FLAT_HULL: &str = "points of a hull lie in a plane: give it a radius, or a point beside the plane";
