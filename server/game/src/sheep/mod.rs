@@ -1,8 +1,8 @@
 //! A sheep, the talk's worked example, alive: it grazes with its flock, flees cars and tornadoes, is thrown about, and gets
 //! up again.
 //!
-//! Owns what a sheep does in a tick. What it wants is [`mind`]'s, which way its flock and its fears want it is [`flock`]'s,
-//! its DOF are [`rig`]'s. It only ever pushes on its DOF through [`muscles`], which are PD controllers on points.
+//! Owns what a sheep does in a tick. What it wants is `mind`'s, which way its flock and its fears want it is `flock`'s,
+//! its DOF are `rig`'s. It only ever pushes on its DOF through `muscles`, which are PD controllers on points.
 
 pub mod anatomy;
 pub mod flock;

@@ -1,8 +1,8 @@
 //! The talk's worked example: a tornado that travels around the level, picks up what it meets and swirls it around, spins
 //! and warps, appears and disappears, and spawns dust.
 //!
-//! Owns the logic, one function for each line of the slide "Code: Loop". What it is made of are [`column`]'s spheres, where
-//! it goes is [`path`]'s, whom it holds are [`victims`]', how it swirls them is [`vortex`]'s, how it looks is [`mesh`]'s,
+//! Owns the logic, one function for each line of the slide "Code: Loop". What it is made of are `column`'s spheres, where
+//! it goes is `path`'s, whom it holds are `victims`', how it swirls them is `vortex`'s, how it looks is [`mesh`]'s,
 //! whether it is there is [`life`]'s. It pushes on its own spheres and dust, and on its victims, through controllers alone.
 
 mod column;
