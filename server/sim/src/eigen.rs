@@ -40,8 +40,9 @@ fn rotate(a: &mut [[f64; 3]; 3], vectors: &mut [DVec3; 3], p: usize, q: usize, o
         return;
     }
     let tau = (a[q][q] - a[p][p]) / (2.0 * apq);
-    let tangent = 1.0f64.copysign(tau) / (tau.abs() + tau.hypot(1.0));
-    let cosine = 1.0 / tangent.hypot(1.0);
+    // Where τ² overflows there is nothing to turn, and the square root is infinite; `hypot` was a fifth of a flock's tick.
+    let tangent = 1.0f64.copysign(tau) / (tau.abs() + (1.0 + tau * tau).sqrt());
+    let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
     let sine = tangent * cosine;
     a[p][p] -= tangent * apq;
     a[q][q] += tangent * apq;
