@@ -5,7 +5,7 @@ use pita_sim::SimError;
 use super::Arena;
 use crate::arena_file::{AiFile, ArenaFile};
 use crate::driver::{AiDriver, Driver};
-use crate::spawn::{self, Pose};
+use crate::spawn::Pose;
 use crate::vehicle::{Identity, Vehicle};
 
 /// What those who fill places are called.
@@ -53,7 +53,7 @@ impl Arena {
 
     fn add_filler(&mut self, cast: &mut Cast) -> Result<(), SimError> {
         let id = self.new_id();
-        let pose = spawn::choose(&self.spawns, &self.positions_but(id));
+        let pose = self.free_spawn(id);
         let number = cast.count;
         let behaviour = cast.ai.behaviours.get(number % cast.ai.behaviours.len().max(1)).copied().unwrap_or_default();
         let driver = AiDriver::new(behaviour, cast.route.clone(), number % cast.route.len(), cast.ai.speed);

@@ -5,7 +5,7 @@ use pita_sim::{DVec3, SimError, World};
 use super::{Arena, ArenaEvent};
 use crate::actor::{Actor, WhenLost};
 use crate::arena_file::ACTORS_MAX;
-use crate::spawn;
+use crate::spawn::{self, Pose};
 use crate::step::{EFFECTS_MAX, LogicReport, Other, Request, Step};
 
 impl Arena {
@@ -50,7 +50,7 @@ impl Arena {
             None => return,
             Some(WhenLost::Remove) => return self.remove(id),
             Some(WhenLost::Home(pose)) => pose,
-            Some(WhenLost::Spawn) => spawn::choose(&self.spawns, &self.positions_but(id)),
+            Some(WhenLost::Spawn) => self.free_spawn(id),
         };
         if let Some(actor) = self.actors.get_mut(&id) {
             // Homes and spawn points are checked when the arena is built: the engine has no reason to refuse one.
@@ -193,9 +193,11 @@ impl Arena {
         self.events.push(ArenaEvent::ActorRemoved(id));
     }
 
-    /// Where every actor but `id` is.
-    pub(super) fn positions_but(&self, id: u32) -> Vec<DVec3> {
+    /// Where there is room for actor `id`.
+    pub(super) fn free_spawn(&self, id: u32) -> Pose {
         let others = self.actors.iter().filter(|(other, _)| **other != id);
-        others.filter_map(|(_, actor)| self.world.position(*actor.bodies().first()?)).collect()
+        let places: Vec<DVec3> =
+            others.filter_map(|(_, actor)| self.world.position(*actor.bodies().first()?)).collect();
+        spawn::choose(&self.spawns, &places, self.bounds.max[1])
     }
 }

@@ -2,7 +2,6 @@
 
 use super::{Arena, ArenaEvent, Command};
 use crate::driver::Driver;
-use crate::spawn;
 use crate::vehicle::{Identity, Vehicle};
 
 impl Arena {
@@ -25,7 +24,7 @@ impl Arena {
         }
         self.leave(slot, "replaced".to_owned());
         let id = self.new_id();
-        let pose = spawn::choose(&self.spawns, &self.positions_but(id));
+        let pose = self.free_spawn(id);
         let identity = Identity { id, name: name.clone(), slot: Some(slot) };
         match Vehicle::add(&mut self.world, identity, self.vehicle.clone(), Driver::Player, pose) {
             Ok(vehicle) => {

@@ -84,6 +84,24 @@ fn more_players_than_spawn_points_find_room_above() {
 }
 
 #[test]
+fn a_crowd_on_taken_spawn_points_stays_within_the_bounds() {
+    let crates = "[[actors]]\nkind = \"crate\"\nmaterial = \"asphalt\"\nposition = [-9.0, 0.0, -9.0]\ncopies = [4, 1, 4]\n\
+                  spacing = [6.0, 0.0, 6.0]\n";
+    let bounds = "[bounds]\nmin = [-100.0, -20.0, -100.0]\nmax = [100.0, 80.0, 100.0]\n";
+    let text = format!("{}\n{crates}{bounds}", FLAT.replace("count = [8, 8]", "count = [3, 3]"));
+    let mut track = TestTrack::new(&text, SETTINGS);
+    for slot in 0..64 {
+        track.enter(slot);
+    }
+    let mut lost = 0;
+    for _ in 0..2 * 30 {
+        track.tick();
+        lost += track.arena.logic().lost;
+    }
+    assert_eq!(lost, 0, "of 64 cars on nine points among crates");
+}
+
+#[test]
 fn what_falls_out_of_the_world_is_put_back() {
     let ground = "shape.half_space = {}\nmaterial = \"asphalt\"";
     let island = "shape.box.half = [30.0, 1.0, 30.0]\nmaterial = \"asphalt\"\nposition = [0.0, -1.0, 0.0]";
