@@ -24,7 +24,11 @@ use crate::{
     wire::Wire,
 };
 #[cfg(feature = "prediction")]
-use {crate::prediction::Predictor, pita_protocol::message::ArenaSource, std::sync::Mutex};
+use {
+    crate::prediction::Predictor,
+    pita_protocol::message::{ArenaSource, Mount, PartDescription},
+    std::sync::Mutex,
+};
 
 /// How often a spectator, who drives nothing, says which snapshots it has: what they are coded against must not get old.
 const ACKNOWLEDGED: Duration = Duration::from_millis(66);
@@ -125,7 +129,9 @@ async fn predictor(
     let asked = transport::ask(zenoh, &keys.source(), "source", Vec::new(), wanted.connect_timeout).await?;
     let source: ArenaSource = asked.ok_or_else(|| no_arena(wanted))?;
     let own = accepted.description.actors.iter().find(|actor| Some(actor.id) == accepted.actor);
-    let slices = own.ok_or(ClientError::NoActor)?.parts.iter().map(|part| part.slice).collect();
+    // What is of a game's own kind is what the car looks like, no part of its motion.
+    let moves = |part: &&PartDescription| part.mount != Mount::Own;
+    let slices = own.ok_or(ClientError::NoActor)?.parts.iter().filter(moves).map(|part| part.slice).collect();
     Predictor::new(&source.toml, accepted.tick_hz, slices).map_err(ClientError::Arena)
 }
 

@@ -2,7 +2,8 @@
 //!
 //! Owns the vehicle's logic in stage 3: from the controls of its driver to steering angles, drive torques, brakes and
 //! pushes. The bodies are [`rig`]'s, the smoothing of the controls is [`response`]'s, engine and gears are
-//! [`drive_train`]'s, [`brakes`] has the brakes, [`stunts`] what no real car does, [`parameters`] the numbers.
+//! [`drive_train`]'s, [`brakes`] has the brakes, [`stunts`] what no real car does, [`squash`] what its body looks like
+//! meanwhile, [`parameters`] the numbers.
 //! The vehicle pushes on the world only through its axles, the clutches between them, and forces for one tick.
 
 pub mod brakes;
@@ -10,6 +11,7 @@ pub mod drive_train;
 pub mod parameters;
 pub mod response;
 pub mod rig;
+pub mod squash;
 pub mod stunts;
 
 use glam::DVec3;
@@ -26,6 +28,7 @@ use drive_train::DriveTrain;
 pub use parameters::VehicleParameters;
 use response::Pedals;
 use rig::{Rig, WHEELS, Wheel};
+use squash::Squash;
 use stunts::{Footing, Stage, Stunts};
 
 /// Height of the wheels above the underside of the car that was, after a reset, m: clears the ground where an overturned
@@ -46,6 +49,10 @@ pub struct Vehicle {
     info: ActorInfo,
     parameters: VehicleParameters,
     rig: Rig,
+    /// `None` where its body keeps its shape.
+    squash: Option<Squash>,
+    /// Those of the rig, then that of the squash.
+    bodies: Vec<BodyId>,
     driver: Driver,
     controls: Controls,
     response: Pedals,
@@ -72,9 +79,14 @@ impl Vehicle {
         pose: Pose,
     ) -> Result<Self, SimError> {
         let rig = Rig::add(world, &parameters, pose)?;
+        let squash = Squash::add(world, &parameters, pose.position).inspect_err(|_| rig.remove(world))?;
+        let skin = squash.as_ref().map(|squash| squash.part(world, &parameters));
         let Identity { id, name, slot } = identity;
-        let info = ActorInfo { id, kind: "vehicle", name, slot, parts: rig.parts(world) };
+        let parts = rig.parts(world).into_iter().chain(skin).collect();
+        let info = ActorInfo { id, kind: "vehicle", name, slot, parts };
         Ok(Self {
+            bodies: rig.bodies().iter().copied().chain(squash.as_ref().map(Squash::body)).collect(),
+            squash,
             info,
             stunts: Stunts::new(&parameters),
             parameters,
@@ -192,7 +204,7 @@ impl Actor for Vehicle {
     }
 
     fn bodies(&self) -> &[BodyId] {
-        self.rig.bodies()
+        &self.bodies
     }
 
     /// Pedals and steering, whether reset was held, time until it works again, gear and shift, stunts.
@@ -244,6 +256,9 @@ impl Actor for Vehicle {
         if self.fighter.as_ref().is_some_and(Fighter::is_out) {
             self.controls = Controls { handbrake: true, ..Controls::default() };
         }
+        if let Some(squash) = &mut self.squash {
+            squash.follow(step.world, &motion)?;
+        }
         self.reset_if_asked(step, &motion)?;
         let speed = motion.forward_speed();
         self.response.follow(&self.controls, &self.parameters, speed, step.dt);
@@ -270,6 +285,9 @@ impl Actor for Vehicle {
         (self.response, self.drive_train) = (Pedals::default(), DriveTrain::default());
         if let Some(fighter) = self.fighter.as_mut().filter(|fighter| fighter.is_out()) {
             fighter.restore();
+        }
+        if let Some(squash) = &mut self.squash {
+            squash.reset(world)?;
         }
         self.rig.place(world, pose)
     }

@@ -53,7 +53,7 @@ pub use integrate::{Method, Preconditioner, StepReport, StoppedBecause};
 pub use potential::{
     Anchor, AngleLimitDesc, AngleLimitId, AntiRollBarDesc, AntiRollBarId, AxleControl, AxleDesc, AxleId, BallJointDesc,
     BallJointId, DistanceLimitDesc, DistanceLimitId, Driven, FixedJointDesc, FixedJointId, HingeDesc, HingeId, Motor,
-    MotorDesc, MotorId, PdControl, PdDesc, PdId, RodDesc, RodId, SliderDesc, SliderId, SpringDesc, SpringId,
+    MotorDesc, MotorId, PdControl, PdDesc, PdGains, PdId, RodDesc, RodId, SliderDesc, SliderId, SpringDesc, SpringId,
     UniversalJointDesc, UniversalJointId,
 };
 pub use settings::{ContactSettings, Settings, SleepSettings, SolverSettings};

@@ -12,6 +12,8 @@ impl Arena {
         file.actors.clear();
         file.drivers.clear();
         (file.ai, file.combat) = (None, None);
+        // It is no part of the motion.
+        file.vehicle.squash.strength = 0.0;
         Self::from_file(&file, settings, &ActorKinds::none())
     }
 

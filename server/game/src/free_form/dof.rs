@@ -3,20 +3,18 @@
 
 use glam::{DMat3, DVec3};
 use pita_sim::dof::{BlockSize, Columns, Inertia, LocalState, PointMasses};
-use pita_sim::{Dof, DofKind, Frame, PartPoint};
+use pita_sim::{Dof, DofKind, Frame, PartPoint, PdGains};
 
 use super::Appearance;
 
 /// Blocks of three numbers.
 const BLOCKS: usize = Appearance::NUMBERS / 3;
 
-/// Frequency with which the numbers follow what they are asked to be, critically damped, rad/s: a third of a second.
-const FOLLOWS: f64 = 18.0;
-
-/// An [`Appearance`] as Q: its numbers, each of mass 1 on a critically damped spring towards the number that the controls
-/// ask for.
+/// An [`Appearance`] as Q: its numbers, each of mass 1 on a damped spring towards the number that the controls ask for.
 pub struct AppearanceDof {
     masses: PointMasses,
+    /// Of the springs: how the numbers follow what they are asked to be.
+    gains: PdGains,
     /// What stands for its place where somebody asks for one, m.
     place: DVec3,
     /// Nothing here has weight: what the world's gravity, m/s², does to the numbers is taken back.
@@ -25,10 +23,10 @@ pub struct AppearanceDof {
 
 impl AppearanceDof {
     /// The numbers of something at `place`, m, in a world with `gravity`, m/s².
-    pub fn new(place: DVec3, gravity: DVec3) -> Self {
+    pub fn new(place: DVec3, gravity: DVec3, gains: PdGains) -> Self {
         let mut masses = PointMasses::new(BLOCKS);
         masses.diagonal.fill(1.0);
-        Self { masses, place, gravity }
+        Self { masses, gains, place, gravity }
     }
 }
 
@@ -63,17 +61,18 @@ impl Dof for AppearanceDof {
 
     fn energy(&self, at: &LocalState, gradient: &mut [f64]) -> f64 {
         let weight = self.gravity.to_array().into_iter().cycle();
+        let PdGains { stiffness, damping } = self.gains;
         let mut energy = 0.0;
         for (i, (gradient, weight)) in gradient.iter_mut().zip(weight).enumerate() {
             let (off, rate) = (at.q1[i] - at.controls[i], at.v1[i]);
-            energy += 0.5 * FOLLOWS * FOLLOWS * off * off + FOLLOWS * at.dt * rate * rate + weight * at.q1[i];
-            *gradient += FOLLOWS * FOLLOWS * off + 2.0 * FOLLOWS * rate + weight;
+            energy += 0.5 * (stiffness * off * off + damping * at.dt * rate * rate) + weight * at.q1[i];
+            *gradient += stiffness * off + damping * rate + weight;
         }
         energy
     }
 
     fn point_stiffness(&self, at: &LocalState, own: &mut [DMat3], _pairs: &mut [DMat3]) {
-        let stiffness = FOLLOWS * FOLLOWS + 2.0 * FOLLOWS / at.dt;
+        let stiffness = self.gains.stiffness + self.gains.damping / at.dt;
         own.iter_mut().for_each(|block| *block += DMat3::IDENTITY * stiffness);
     }
 }

@@ -4,9 +4,7 @@ use std::sync::Arc;
 
 use pita_sim::mass::{Density, Polyhedron};
 use pita_sim::potential::elasticity::Elastic;
-use pita_sim::{
-    BodyId, Collider, DVec3, FigureDesc, Lattice, LatticeDesc, Material, PartCollider, Shape, SimError, World,
-};
+use pita_sim::{BodyId, DVec3, EmbeddedHull, FigureDesc, Lattice, LatticeDesc, Material, Shape, SimError, World};
 use serde::Deserialize;
 
 use crate::actor::{Actor, ActorInfo, WhenLost};
@@ -19,8 +17,8 @@ use crate::spawn::Pose;
 const POISSON: f64 = 0.4;
 /// Time constant of internal damping, s.
 const DAMPING: f64 = 0.05;
-/// Radius of the balls that make up its surface, in the shortest edge of its cells.
-const BALL: f64 = 0.3;
+/// Radius by which the hulls of its cells are extruded, in the shortest edge of the cells.
+const ROUNDING: f64 = 0.1;
 
 /// Keys of `kind = "jelly"`: a block that stands on its place.
 #[derive(Clone, Debug, Deserialize)]
@@ -83,9 +81,10 @@ impl ActorKind for Jelly {
 
     fn add(site: &mut Site, parameters: &JellyParameters) -> Result<Self, SimError> {
         let lattice = Arc::new(lattice_of(parameters)?);
-        let colliders = balls(&lattice, parameters, site.material(&parameters.material));
+        let hulls = hulls(&lattice, parameters, site.material(&parameters.material))?;
         let (q, v) = (lattice.placed(site.pose.position, site.pose.rotation()), lattice.still());
-        let body = site.world.add_figure(FigureDesc { dof: lattice.clone(), q, v, colliders })?;
+        let figure = FigureDesc { dof: lattice.clone(), q, v, colliders: Vec::new() };
+        let body = site.world.add_figure_with_hulls(figure, hulls)?;
         let points: Vec<_> = surface(parameters).collect();
         let places: Vec<_> = points.iter().filter_map(|&node| lattice.at(node)).collect();
         let skin = PartInfo::skin(site.world, body, &places, Shape::Hull { points, radius: 0.0 });
@@ -115,25 +114,33 @@ fn lattice_of(parameters: &JellyParameters) -> Result<Lattice, SimError> {
     )
 }
 
+/// The grid of nodes, or of cells, that is `counts` long: those at its surface.
+fn at_surface(counts: [u32; 3]) -> impl Iterator<Item = DVec3> {
+    let [nx, ny, nz] = counts;
+    let all = (0..nz).flat_map(move |k| (0..ny).flat_map(move |j| (0..nx).map(move |i| [i, j, k])));
+    let is_outside = move |at: &[u32; 3]| (0..3).any(|axis| at[axis] == 0 || at[axis] + 1 == counts[axis]);
+    all.filter(is_outside).map(|at| DVec3::from(at.map(f64::from)))
+}
+
 /// Nodes of the block's surface in its own frame, m.
 fn surface(parameters: &JellyParameters) -> impl Iterator<Item = DVec3> {
     let (min, max) = corners(parameters);
-    let [nx, ny, nz] = parameters.cells;
-    let nodes = (0..=nz).flat_map(move |k| (0..=ny).flat_map(move |j| (0..=nx).map(move |i| [i, j, k])));
-    let on_surface = nodes.filter(move |&[i, j, k]| i % nx == 0 || j % ny == 0 || k % nz == 0);
-    let cells = DVec3::new(nx.into(), ny.into(), nz.into());
-    on_surface.map(move |node| min + (max - min) * DVec3::from(node.map(f64::from)) / cells)
+    let cells = DVec3::from(parameters.cells.map(f64::from));
+    at_surface(parameters.cells.map(|n| n + 1)).map(move |node| min + (max - min) * node / cells)
 }
 
-/// Balls at the nodes of the surface, just inside of it.
-fn balls(lattice: &Lattice, parameters: &JellyParameters, material: Material) -> Vec<PartCollider> {
+/// A hull of each cell at the surface, which deforms with it; what is dented so has a dent. All together reach as far as
+/// the block.
+fn hulls(lattice: &Lattice, parameters: &JellyParameters, material: Material) -> Result<Vec<EmbeddedHull>, SimError> {
     let (min, max) = corners(parameters);
     let cell = (max - min) / DVec3::from(parameters.cells.map(f64::from));
-    let radius = BALL * cell.min_element();
-    let collider = Collider::new(Shape::Ball { radius }, material);
-    let inside = surface(parameters).map(|node| node.clamp(min + radius, max - radius));
-    let places = inside.filter_map(|node| lattice.at(node));
-    places.map(|at| PartCollider { at, collider: collider.clone() }).collect()
+    let radius = ROUNDING * cell.min_element();
+    let corner = |of: DVec3, i: usize| {
+        let step = DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64);
+        (min + cell * (of + step)).clamp(min + radius, max - radius)
+    };
+    let hull = |of: DVec3| lattice.hull(&[0, 1, 2, 3, 4, 5, 6, 7].map(|i| corner(of, i)), radius, material);
+    at_surface(parameters.cells).map(hull).collect()
 }
 
 impl Actor for Jelly {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec2, DVec3};
 use pita_sim::collide::TriangleMesh;
-use pita_sim::{BodyId, FigureDesc, SimError, World};
+use pita_sim::{BodyId, FigureDesc, JointDrive, SimError, World};
 
 use super::TornadoParameters;
 use super::column::Column;
@@ -45,6 +45,9 @@ pub fn mesh(p: &TornadoParameters) -> Result<TriangleMesh, SimError> {
     TriangleMesh::new(&points, &quads.flatten().collect::<Vec<_>>())
 }
 
+/// How the funnel follows what it is asked to be: a third of a second, without swinging.
+const EASE: JointDrive = JointDrive::Position { frequency: 2.0, damping_ratio: 1.0 };
+
 /// What spins and warps the funnel: it says what the funnel's DOF shall be, and the integrator moves them there.
 pub struct Warping {
     keys: Option<KeyFrames<{ Warp::NUMBERS }>>,
@@ -62,7 +65,8 @@ impl Warping {
         let keys: Vec<_> = p.warp.iter().map(|frame| frame.key()).collect();
         let keys = if keys.is_empty() { None } else { Some(KeyFrames::new(keys, Some(p.warp_period))?) };
         let q = Appearance { strength: 0.0, ..Appearance::PLAIN }.numbers().to_vec();
-        let (v, dof) = (vec![0.0; q.len()], AppearanceDof::new(place, world.settings().gravity));
+        let gains = EASE.gains(world.settings().dt)?;
+        let (v, dof) = (vec![0.0; q.len()], AppearanceDof::new(place, world.settings().gravity, gains));
         let body = world.add_figure(FigureDesc { dof: Arc::new(dof), q, v, colliders: Vec::new() })?;
         Ok(Self { keys, body, time: 0.0 })
     }

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::arena_file::{ArenaError, Key};
 use drive_train::{DifferentialParameters, Drive, EngineParameters, GearboxParameters};
 use running_gear::{BrakeParameters, SteeringParameters, SuspensionParameters};
-use stunts::{AirControlParameters, BoostParameters, JumpParameters, SelfRightingParameters};
+use stunts::{AirControlParameters, BoostParameters, JumpParameters, SelfRightingParameters, SquashParameters};
 
 /// Standard acceleration of gravity, m/s²: what the static sag of the suspension and the grip of tyres are taken at.
 pub const STANDARD_GRAVITY: f64 = 9.81;
@@ -73,6 +73,8 @@ pub struct VehicleParameters {
     pub air_control: AirControlParameters,
     /// Getting up again.
     pub self_righting: SelfRightingParameters,
+    /// A body that gives way to what it feels.
+    pub squash: SquashParameters,
 }
 
 impl Default for VehicleParameters {
@@ -103,6 +105,7 @@ impl Default for VehicleParameters {
             jump: JumpParameters::default(),
             air_control: AirControlParameters::default(),
             self_righting: SelfRightingParameters::default(),
+            squash: SquashParameters::default(),
         }
     }
 }
@@ -193,7 +196,8 @@ impl VehicleParameters {
         self.boost.check(&key.at("boost"))?;
         self.jump.check(&key.at("jump"))?;
         self.air_control.check(&key.at("air_control"))?;
-        self.self_righting.check(&key.at("self_righting"))
+        self.self_righting.check(&key.at("self_righting"))?;
+        self.squash.check(&key.at("squash"))
     }
 }
 

@@ -74,11 +74,12 @@ impl Rig {
     /// What the engine says; what was added before is taken out again.
     pub fn add(world: &mut World, p: &VehicleParameters, pose: Pose) -> Result<Self, SimError> {
         let mut bodies = Vec::with_capacity(5);
-        Self::build(world, p, pose, &mut bodies).inspect_err(|_| {
-            for &body in &bodies {
-                world.remove_body(body);
-            }
-        })
+        Self::build(world, p, pose, &mut bodies).inspect_err(|_| remove_all(world, &bodies))
+    }
+
+    /// Takes it out of the world.
+    pub fn remove(&self, world: &mut World) {
+        remove_all(world, &self.bodies);
     }
 
     fn build(world: &mut World, p: &VehicleParameters, pose: Pose, added: &mut Vec<BodyId>) -> Result<Self, SimError> {
@@ -188,6 +189,12 @@ impl Rig {
         }
         Ok(())
     }
+}
+
+fn remove_all(world: &mut World, bodies: &[BodyId]) {
+    bodies.iter().for_each(|&body| {
+        world.remove_body(body);
+    });
 }
 
 /// Chassis and wheels with the wheels on the ground and the suspension at its static sag.

@@ -18,6 +18,7 @@ mod rehearsals;
 mod reloads;
 mod reproducibility;
 mod sheep;
+mod squash;
 mod stunts;
 mod test_track;
 mod tornado;

@@ -106,6 +106,21 @@ fn a_drawbridge_opens_and_closes_by_the_clock() {
     assert!(angle(&track).abs() < 0.5, "down again: {}", angle(&track));
 }
 
+/// Its surface has no gaps: what is smaller than its cells does not fall in, wherever it lies.
+#[test]
+fn a_small_thing_lies_on_a_jelly() {
+    let pebble =
+        "[[actors]]\nkind = \"crate\"\nmaterial = \"asphalt\"\nmass = 1\nsize = 0.2\nposition = [30.5, 2.2, 40.5]";
+    let mut track = with("jelly", &format!("position = [30, 0.5, 40]\n{pebble}"));
+    run(&mut track, 4.0);
+    let world = track.arena.world();
+    let at = world.position(bodies(&track.arena, "crate")[0]).unwrap();
+    let jelly = bodies(&track.arena, "jelly")[0];
+    let beneath = world.frame(jelly, PartPoint { part: 7, point: DVec3::new(0.5, 1.5, 0.5) }).unwrap().position;
+    let height = at.y - DVec3::from(beneath).y;
+    assert!((0.08..0.13).contains(&height), "its middle is {height} m above the jelly's top");
+}
+
 /// It sags a little, carries a crate, and keeps its volume.
 #[test]
 fn a_jelly_wobbles_and_springs_back() {

@@ -2,7 +2,7 @@
 
 use pita_game::driver::Motion;
 use pita_game::{Arena, ArenaEvent, ArenaSettings, Command, Controls, Ports, Stage, pipeline};
-use pita_sim::{BodyId, DQuat, DVec3, SimError, SliceView, World};
+use pita_sim::{BodyId, DQuat, DVec3, DofKind, SimError, SliceView, World};
 
 /// Nothing but ground.
 pub const FLAT: &str = include_str!("../../../../configs/arenas/flat.toml");
@@ -146,12 +146,13 @@ impl TestTrack {
         (way / turned.abs(), turned / (ticks * self.dt))
     }
 
-    /// Changes bodies of the vehicle in `slot`, chassis first, from outside the game.
+    /// Changes bodies of the vehicle in `slot`, chassis first, from outside the game; its squash it leaves alone.
     fn meddle(&mut self, slot: u16, meddle: impl Fn(&mut World, &[BodyId])) {
         let slices: Vec<u32> = self.arena.actor_of(slot).expect("it is there").parts.iter().map(|p| p.slice).collect();
         let world = self.arena.world();
         let body = |slice: &u32| world.bodies().iter().copied().find(|&body| world.serial(body) == Some(*slice));
-        let bodies: Vec<BodyId> = slices.iter().filter_map(body).collect();
+        let is_rigid = |body: &BodyId| world.slice(*body).is_some_and(|slice| slice.kind == DofKind::RigidBody);
+        let bodies: Vec<BodyId> = slices.iter().filter_map(body).filter(is_rigid).collect();
         // Nothing is added: only this way leads to the world from here.
         let nothing = self.arena.add_actor(|world, _| {
             meddle(world, &bodies);

@@ -46,8 +46,10 @@ impl PdControl {
 
 /// Gains per kg: Ks in 1/s², Kd in 1/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct PdGains {
+pub struct PdGains {
+    /// Ks, 1/s².
     pub stiffness: f64,
+    /// Kd, 1/s.
     pub damping: f64,
 }
 

@@ -101,3 +101,33 @@ impl SelfRightingParameters {
         key.at("rate").number(self.rate, 0.1, 20.0, "rad/s")
     }
 }
+
+/// `[vehicle.squash]`: the body gives way to what it feels, and swings back.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SquashParameters {
+    /// How much, as a share of what a spring of the frequency would give way; 0 for a body that keeps its shape.
+    pub strength: f64,
+    /// With which it swings back, Hz.
+    pub frequency: f64,
+    /// Its damping; 1 does not swing.
+    pub damping_ratio: f64,
+    /// Share of its height by which it is squashed or stretched, or leans, under the hardest lasting push.
+    pub limit: f64,
+}
+
+impl Default for SquashParameters {
+    fn default() -> Self {
+        Self { strength: 0.0, frequency: 2.5, damping_ratio: 0.35, limit: 0.35 }
+    }
+}
+
+impl SquashParameters {
+    pub(super) fn check(&self, key: &Key) -> Result<(), ArenaError> {
+        key.at("strength").number(self.strength, 0.0, 10.0, "")?;
+        // What ticks of 25 Hz can show.
+        key.at("frequency").number(self.frequency, 0.2, 2.5, "Hz")?;
+        key.at("damping_ratio").number(self.damping_ratio, 0.35, 4.0, "")?;
+        key.at("limit").number(self.limit, 0.0, 0.5, "of the height")
+    }
+}

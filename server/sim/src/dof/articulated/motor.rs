@@ -110,11 +110,11 @@ fn rotation_vector(q: DQuat) -> DVec3 {
 }
 
 impl JointDrive {
-    /// Gains per unit of inertia in a world of ticks of `dt`.
+    /// Gains per unit of inertia in a world of ticks of `dt`: what a potential of a game's own needs to move as asked for.
     ///
     /// # Errors
     /// What this tick cannot show.
-    pub(crate) fn gains(self, dt: f64) -> Result<PdGains, SimError> {
+    pub fn gains(self, dt: f64) -> Result<PdGains, SimError> {
         match self {
             Self::Position { frequency, damping_ratio } => PdGains::new(frequency, damping_ratio, dt),
             Self::Velocity { time_constant } => {
