@@ -1,17 +1,13 @@
-//! Points of a body that is embedded in nodes: a place is Σ Nᵢ xᵢ, its axes turn as the polar decomposition of the
-//! deformation gradient F = Σ xᵢ ⊗ ∇Nᵢ does, F = R S.
+//! Points of a body that is embedded in nodes: a place is Σ Nᵢ xᵢ, its axes turn as the rotation of the deformation
+//! gradient F = Σ xᵢ ⊗ ∇Nᵢ does.
 //!
 //! Shared by natural coordinates, finite elements and lattices; knows none of them.
 
 use glam::{DMat3, DVec3};
 
+use super::polar::Polar;
 use super::{Columns, Frame, MountNode};
 use crate::potential::cross_matrix;
-use crate::potential::elasticity::Principal;
-
-/// Least sum of two stretches by which a turn is divided: where an element that is inside out is as long as it is wide,
-/// its axes may turn at any speed.
-const LEAST_SUM: f64 = 0.1;
 
 /// A material point between N nodes.
 #[derive(Clone, Copy, Debug)]
@@ -25,22 +21,28 @@ pub(super) struct EmbeddedPoint<const N: usize> {
 impl<const N: usize> EmbeddedPoint<N> {
     /// The frame at the point, with nodes at `x` that move at `v`.
     pub fn frame(&self, x: &[DVec3; N], v: &[DVec3; N]) -> Frame<f64> {
-        let (rotation, turns) = self.turns(x);
-        let angular = turns.iter().zip(v).map(|(turn, &v)| *turn * v).sum();
-        Frame::new(self.mean(x), rotation, self.mean(v), angular)
+        self.turned_frame(&self.polar(x), x, v)
     }
 
-    /// The frame's derivatives with respect to the velocities of each node.
-    pub fn columns(&self, x: &[DVec3; N]) -> [Columns; N] {
-        let (_, turns) = self.turns(x);
-        std::array::from_fn(|node| {
-            let mut columns = Columns::default();
-            for (k, column) in columns.iter_mut().enumerate().take(3) {
-                column[k] = self.weights[node];
-                column[3..].copy_from_slice(&turns[node].col(k).to_array());
-            }
-            columns
-        })
+    /// Hands `visit` each node's number with the frame's derivatives with respect to its velocity.
+    pub fn columns(&self, x: &[DVec3; N], visit: impl FnMut(usize, &Columns)) {
+        self.turned_columns(&self.polar(x), visit);
+    }
+
+    /// Both at once.
+    pub fn frame_and_columns(&self, x: &[DVec3; N], v: &[DVec3; N], visit: impl FnMut(usize, &Columns)) -> Frame<f64> {
+        let polar = self.polar(x);
+        self.turned_columns(&polar, visit);
+        self.turned_frame(&polar, x, v)
+    }
+
+    /// Derivatives of the place alone: they never change.
+    pub fn place_columns(&self, mut visit: impl FnMut(usize, &Columns)) {
+        let mut columns = Columns::default();
+        for (node, &weight) in self.weights.iter().enumerate() {
+            (0..3).for_each(|k| columns[k][k] = weight);
+            visit(node, &columns);
+        }
     }
 
     /// For those who show the point: its nodes, given by their numbers.
@@ -58,17 +60,28 @@ impl<const N: usize> EmbeddedPoint<N> {
         self.weights.iter().zip(of).map(|(&weight, &x)| weight * x).sum()
     }
 
-    /// R, and for each node the matrix that makes of its velocity what it adds to R's angular velocity.
-    ///
-    /// R' = [ω]× R and the symmetry of S give ω = R (tr(S) − S)⁻¹ Rᵀ Σ (R ∇Nᵢ) × vᵢ; in principal axes the inverse
-    /// divides by sums of two stretches.
-    fn turns(&self, x: &[DVec3; N]) -> (DMat3, [DMat3; N]) {
+    fn polar(&self, x: &[DVec3; N]) -> Polar {
         let column = |k: usize| self.gradients.iter().zip(x).map(|(g, &x)| g[k] * x).sum();
-        let Principal { u, stretches: s, v } = Principal::of(DMat3::from_cols(column(0), column(1), column(2)));
-        let rotation = u * v.transpose();
-        let sums = DVec3::new(s.y + s.z, s.z + s.x, s.x + s.y).max(DVec3::splat(LEAST_SUM));
-        let yielding = u * DMat3::from_diagonal(sums.recip()) * u.transpose();
-        (rotation, self.gradients.map(|g| yielding * cross_matrix(rotation * g)))
+        Polar::of(DMat3::from_cols(column(0), column(1), column(2)))
+    }
+
+    fn turned_frame(&self, polar: &Polar, x: &[DVec3; N], v: &[DVec3; N]) -> Frame<f64> {
+        let Polar { rotation, yielding } = *polar;
+        let circulation: DVec3 = self.gradients.iter().zip(v).map(|(&g, &v)| (rotation * g).cross(v)).sum();
+        Frame::new(self.mean(x), rotation, self.mean(v), yielding * circulation)
+    }
+
+    fn turned_columns(&self, polar: &Polar, mut visit: impl FnMut(usize, &Columns)) {
+        let Polar { rotation, yielding } = *polar;
+        let mut columns = Columns::default();
+        for (node, (&weight, &gradient)) in self.weights.iter().zip(&self.gradients).enumerate() {
+            let turn = yielding * cross_matrix(rotation * gradient);
+            for (k, column) in columns.iter_mut().enumerate().take(3) {
+                column[k] = weight;
+                column[3..].copy_from_slice(&turn.col(k).to_array());
+            }
+            visit(node, &columns);
+        }
     }
 }
 
@@ -78,8 +91,10 @@ mod tests {
     use proptest::array::{uniform3, uniform4};
     use proptest::prelude::*;
 
+    use super::super::polar::LEAST_SUM;
     use super::*;
     use crate::dof::Twist;
+    use crate::potential::elasticity::Principal;
 
     proptest! {
         /// Position and rotation move as velocity and angular velocity say, squeezed and inside out too; and the columns
@@ -107,11 +122,19 @@ mod tests {
             let error = turn.to_scaled_axis() / (2.0 * step) - angular;
             prop_assert!(error.length() < 1e-6 * (1.0 + angular.length() / s.z.abs().max(1e-2)), "{error}");
             let mut sum = [0.0; 6];
-            for (columns, v) in point.columns(&x).iter().zip(v) {
-                for (column, v) in columns.iter().zip(v.to_array()) {
+            let frame = point.frame_and_columns(&x, &v, |node, columns| {
+                for (column, v) in columns.iter().zip(v[node].to_array()) {
                     (0..6).for_each(|i| sum[i] += column[i] * v);
                 }
-            }
+            });
+            prop_assert_eq!(frame, point.frame(&x, &v));
+            let mut place = [0.0; 6];
+            point.place_columns(|node, columns| {
+                for (column, v) in columns.iter().zip(v[node].to_array()) {
+                    (0..6).for_each(|i| place[i] += column[i] * v);
+                }
+            });
+            prop_assert_eq!(place[..3].to_vec(), sum[..3].to_vec());
             let error = (DVec3::from_slice(&sum) - linear).length() + (DVec3::from_slice(&sum[3..]) - angular).length();
             prop_assert!(error < 1e-12 * (1.0 + angular.length()));
         }

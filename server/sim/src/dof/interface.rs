@@ -159,6 +159,17 @@ pub trait Dof: Send + Sync {
         self.frame(at, q, v)
     }
 
+    /// Whether the place of a material point, apart from its axes, is linear in Q: [`Dof::place_jacobian`] is then the same
+    /// in every state. Springs, rods, ball joints and controllers at such points are cheap.
+    fn is_linear(&self, _at: PartPoint) -> bool {
+        false
+    }
+
+    /// As [`Dof::jacobian`], for a material point whose axes nobody asks for: what turns them may be left out.
+    fn place_jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns)) {
+        self.jacobian(at, q, visit);
+    }
+
     /// How the frame at a material point follows from Q, for whoever shows the body and does not know its kind. `None`
     /// where that cannot be said: the body is shown by what its game makes of Q.
     fn mount(&self, _at: PartPoint) -> Option<Mount> {

@@ -14,6 +14,7 @@ mod mount;
 pub mod natural;
 mod nodal;
 pub(crate) mod particle;
+mod polar;
 pub(crate) mod rigid_body;
 
 use glam::{DMat3, DQuat, DVec3};

@@ -16,6 +16,61 @@ use crate::potential::elasticity::Elastic;
 /// Longest time constant of damping, s.
 const DAMPING_MAX: f64 = 10.0;
 
+/// What a kind of elements has of [`Dof`](super::Dof) by its nodes alone: kinematics and inertia. The kind has `nodes`, and
+/// `embedded` answers the nodes about a material point, with the point between them.
+macro_rules! moved_by_nodes {
+    () => {
+        fn blocks(&self) -> &[BlockSize] {
+            &self.nodes.blocks
+        }
+
+        fn frame(&self, at: PartPoint, q: &[f64], v: &[f64]) -> Frame<f64> {
+            let (nodes, point) = self.embedded(at);
+            self.nodes.frame(nodes, &point, [q, v])
+        }
+
+        fn point(&self, at: PartPoint, q: &[f64], v: &[f64]) -> [DVec3; 2] {
+            let (nodes, point) = self.embedded(at);
+            self.nodes.point(nodes, &point, [q, v])
+        }
+
+        fn jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns)) {
+            let (nodes, point) = self.embedded(at);
+            self.nodes.jacobian(nodes, &point, q, visit);
+        }
+
+        fn frame_and_jacobian(
+            &self,
+            at: PartPoint,
+            q: &[f64],
+            v: &[f64],
+            visit: &mut dyn FnMut(usize, &Columns),
+        ) -> Frame<f64> {
+            let (nodes, point) = self.embedded(at);
+            self.nodes.frame_and_jacobian(nodes, &point, [q, v], visit)
+        }
+
+        fn is_linear(&self, _at: PartPoint) -> bool {
+            true
+        }
+
+        fn place_jacobian(&self, at: PartPoint, _q: &[f64], visit: &mut dyn FnMut(usize, &Columns)) {
+            let (nodes, point) = self.embedded(at);
+            self.nodes.place_jacobian(nodes, &point, visit);
+        }
+
+        fn mount(&self, at: PartPoint) -> Option<Mount> {
+            let (nodes, point) = self.embedded(at);
+            Some(self.nodes.mount(nodes, &point))
+        }
+
+        fn inertia(&self) -> Inertia<'_> {
+            Inertia::Points(&self.nodes.masses)
+        }
+    };
+}
+pub(super) use moved_by_nodes;
+
 /// Nodes of a body of elements.
 #[derive(Clone, Debug)]
 pub(super) struct Nodes {
@@ -55,10 +110,13 @@ impl Nodes {
         nodes.map(|node| if self.moves(node) { numbers_of(node, q) } else { self.rest[node as usize] })
     }
 
+    fn velocities<const N: usize>(&self, nodes: [u32; N], v: &[f64]) -> [DVec3; N] {
+        nodes.map(|node| if self.moves(node) { numbers_of(node, v) } else { DVec3::ZERO })
+    }
+
     /// The frame at a point of an element.
     pub fn frame<const N: usize>(&self, nodes: [u32; N], point: &EmbeddedPoint<N>, [q, v]: [&[f64]; 2]) -> Frame<f64> {
-        let velocities = nodes.map(|node| if self.moves(node) { numbers_of(node, v) } else { DVec3::ZERO });
-        point.frame(&self.places(nodes, q), &velocities)
+        point.frame(&self.places(nodes, q), &self.velocities(nodes, v))
     }
 
     /// How the frame at a point of an element follows from the nodes that move.
@@ -76,8 +134,7 @@ impl Nodes {
 
     /// Place and velocity of a point of an element.
     pub fn point<const N: usize>(&self, nodes: [u32; N], point: &EmbeddedPoint<N>, [q, v]: [&[f64]; 2]) -> [DVec3; 2] {
-        let velocities = nodes.map(|node| if self.moves(node) { numbers_of(node, v) } else { DVec3::ZERO });
-        point.place(&self.places(nodes, q), &velocities)
+        point.place(&self.places(nodes, q), &self.velocities(nodes, v))
     }
 
     /// Hands `visit` the nodes of an element that move, with the derivatives of the frame at a point of it.
@@ -88,9 +145,40 @@ impl Nodes {
         q: &[f64],
         visit: &mut dyn FnMut(usize, &Columns),
     ) {
-        let columns = point.columns(&self.places(nodes, q));
-        for (columns, node) in columns.iter().zip(nodes).filter(|&(_, node)| self.moves(node)) {
-            visit(node as usize, columns);
+        point.columns(&self.places(nodes, q), self.moving(nodes, visit));
+    }
+
+    /// [`Nodes::jacobian`] and [`Nodes::frame`] in one.
+    pub fn frame_and_jacobian<const N: usize>(
+        &self,
+        nodes: [u32; N],
+        point: &EmbeddedPoint<N>,
+        [q, v]: [&[f64]; 2],
+        visit: &mut dyn FnMut(usize, &Columns),
+    ) -> Frame<f64> {
+        point.frame_and_columns(&self.places(nodes, q), &self.velocities(nodes, v), self.moving(nodes, visit))
+    }
+
+    /// The same of the place of a point alone.
+    pub fn place_jacobian<const N: usize>(
+        &self,
+        nodes: [u32; N],
+        point: &EmbeddedPoint<N>,
+        visit: &mut dyn FnMut(usize, &Columns),
+    ) {
+        point.place_columns(self.moving(nodes, visit));
+    }
+
+    /// Tells `visit` of those nodes of an element that move.
+    fn moving<const N: usize>(
+        &self,
+        nodes: [u32; N],
+        visit: &mut dyn FnMut(usize, &Columns),
+    ) -> impl FnMut(usize, &Columns) {
+        move |node, columns| {
+            if self.moves(nodes[node]) {
+                visit(nodes[node] as usize, columns);
+            }
         }
     }
 

@@ -5,14 +5,24 @@ use glam::{DMat3, DVec3};
 use super::figure::Figure;
 use crate::dof::{Columns, Frame, PartPoint, Twist};
 
+/// How an attachment follows its figure to a candidate state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Follows {
+    /// As its derivatives at the start of the tick say: contacts.
+    Start,
+    /// As a place alone, and with it that is linear: its derivatives never change, and it has no axes.
+    Place,
+    /// As the figure says, axes and derivatives too.
+    Figure,
+}
+
 /// A material point of a figure at which something acts: one more frame of the island.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Attachment {
     pub figure: u32,
     /// [`ABSENT`](crate::dof::ABSENT) is the part of a point between vertices.
     pub at: PartPoint,
-    /// Its derivatives stay what they were at the start of the tick.
-    pub frozen: bool,
+    pub follows: Follows,
     pub influences: (u32, u32),
     pub start: Frame<f64>,
     /// What resists a force here, kg.
@@ -34,16 +44,27 @@ pub(crate) struct Influence {
 }
 
 impl Attachment {
-    /// The frame at the figure's candidate state; refreshes the derivatives, unless they are frozen.
+    /// The frame at the figure's candidate state; refreshes derivatives that change.
     pub fn frame(&self, figure: &Figure, influences: &mut [Influence]) -> Frame<f64> {
-        if !self.frozen {
-            let mut next = influences.iter_mut();
-            return figure.dof.frame_and_jacobian(self.at, &figure.q1, &figure.v1, &mut |_, columns| {
-                if let Some(influence) = next.next() {
-                    influence.columns = *columns;
-                }
-            });
+        match self.follows {
+            Follows::Start => self.moved_by(figure, influences),
+            Follows::Place => {
+                let [position, velocity] = figure.dof.point(self.at, &figure.q1, &figure.v1);
+                Frame::point(position, velocity)
+            }
+            Follows::Figure => {
+                let mut next = influences.iter_mut();
+                figure.dof.frame_and_jacobian(self.at, &figure.q1, &figure.v1, &mut |_, columns| {
+                    if let Some(influence) = next.next() {
+                        influence.columns = *columns;
+                    }
+                })
+            }
         }
+    }
+
+    /// The frame of the start with the twist of now.
+    fn moved_by(&self, figure: &Figure, influences: &[Influence]) -> Frame<f64> {
         let mut twist = Twist::REST;
         for influence in influences {
             let rates = &figure.v1[figure.offsets[influence.own_block as usize] as usize..];

@@ -1,18 +1,15 @@
-//! Bodies of general kinds within an island: their blocks of unknowns, the material points at which something acts on
-//! them, and their own residual.
+//! A body of a general kind within an island: its blocks of unknowns, its candidate state, and its own residual and
+//! Hessian. What acts on its material points is [`Figures`](super::figures::Figures)'s.
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::attachment::{Attachment, Influence, trace};
-use super::block::{Block, Entry, zero};
-use super::pull_back::{add_block, inertia_block, multiplied, projected};
-use crate::collide::Foot;
-use crate::dof::{
-    ABSENT, Columns, Dof, FigureBody, Frame, Inertia, LocalState, PartInertia, PartLoad, PartPoint, PointMasses, Twist,
-};
+use super::attachment::{Attachment, Follows, Influence, trace};
+use super::block::Entry;
+use super::figures::Blocks;
+use crate::dof::{Dof, FigureBody, Frame, Inertia, LocalState, PartInertia, PartLoad, PartPoint, PointMasses, Twist};
 use crate::potential::Wrench;
 use crate::potential::gravity::Gravity;
 
@@ -33,275 +30,19 @@ pub(crate) struct Figure {
     prepared: Vec<f64>,
     gradient: Vec<f64>,
     /// The parts' centres of mass among the attachments; empty where points carry the mass.
-    parts: Range<u32>,
+    pub parts: Range<u32>,
     /// Momentum that each part would have at the end of the tick without potentials.
-    free_momenta: Vec<Wrench>,
+    pub free_momenta: Vec<Wrench>,
     loads: Vec<PartLoad>,
     /// Stiffness of each part against turns that comes from its loads, N m s.
-    geometric: Vec<DMat3>,
+    pub geometric: Vec<DMat3>,
     /// Of points: stiffness of each by itself and of each pair of the mass matrix, N/m.
     own_stiffness: Vec<DMat3>,
     pair_stiffness: Vec<DMat3>,
 }
 
-/// Takes blocks of a symmetric matrix.
-pub(crate) trait Blocks {
-    /// Adds at (row, column), row not above column; (column, row) is its transpose.
-    fn add(&mut self, row: u32, column: u32, block: &Block<6>);
-
-    /// The same for a block of points: `block` and `mass` times the identity.
-    fn add_point(&mut self, row: u32, column: u32, block: &DMat3, mass: f64);
-}
-
-/// All figures of an island and their attachments.
-#[derive(Default)]
-pub(crate) struct Figures {
-    list: Vec<Figure>,
-    /// Figures of this tick; those after them keep their memory for later.
-    used: usize,
-    pub attachments: Vec<Attachment>,
-    influences: Vec<Influence>,
-    /// Gradient on each attachment.
-    wrenches: Vec<Wrench>,
-    /// Hessian on each attachment.
-    hessians: Vec<Block<6>>,
-    /// Whether the figures' second derivatives have to be positive semidefinite.
-    definite: bool,
-}
-
-/// How many of the last attachments are looked at for one that a new one can share: those of the other contact points of
-/// the same pair of colliders.
-const SHARED: usize = 4;
-
-impl Figures {
-    pub fn clear(&mut self) {
-        self.used = 0;
-        self.attachments.clear();
-        self.influences.clear();
-        self.definite = false;
-    }
-
-    /// From now on second derivatives are positive semidefinite. Answers whether that changes anything.
-    pub fn require_definite(&mut self) -> bool {
-        let changes = !self.definite && self.used > 0;
-        self.definite = true;
-        changes
-    }
-
-    pub fn list(&self) -> &[Figure] {
-        &self.list[..self.used]
-    }
-
-    /// Whether there are figures whose points carry the mass.
-    pub fn have_points(&self) -> bool {
-        self.list().iter().any(|figure| matches!(figure.dof.inertia(), Inertia::Points(_)))
-    }
-
-    /// Adds a figure with blocks at `blocks`. Answers its index.
-    pub fn add(&mut self, body: &FigureBody, blocks: impl Iterator<Item = u32>, [q, v]: [&[f64]; 2], dt: f64) -> u32 {
-        if self.used == self.list.len() {
-            self.list.push(Figure::new(&body.dof));
-        }
-        let figure = &mut self.list[self.used];
-        figure.dof = Arc::clone(&body.dof);
-        figure.start(blocks, [q, v], body);
-        figure.prepare(dt);
-        self.used += 1;
-        self.used as u32 - 1
-    }
-
-    /// Attaches the parts' centres of mass, where parts carry the mass.
-    pub fn attach_parts(&mut self, index: u32, dt: f64, gravity: Gravity) {
-        let dof = Arc::clone(&self.list[index as usize].dof);
-        let start = self.attachments.len() as u32;
-        self.list[index as usize].free_momenta.clear();
-        if let Inertia::Parts(parts) = dof.inertia() {
-            for (part, inertia) in (0..).zip(parts) {
-                let k = self.attach(index, PartPoint { part, point: inertia.centre }, false);
-                let momentum = part_momentum(&self.attachments[k as usize].start, inertia.mass, inertia.inertia);
-                let fall = Wrench { force: (gravity.fall(dt) * inertia.mass).into(), torque: Wrench::ZERO.torque };
-                let mut free = momentum;
-                free += fall;
-                self.list[index as usize].free_momenta.push(free);
-            }
-        }
-        self.list[index as usize].parts = start..self.attachments.len() as u32;
-    }
-
-    /// Makes a frame of a material point. Answers its index among the attachments.
-    pub fn attach(&mut self, figure: u32, at: PartPoint, frozen: bool) -> u32 {
-        let same = |a: &Attachment| (a.figure, a.at, a.frozen) == (figure, at, frozen);
-        if let Some(back) = self.attachments.iter().rev().take(SHARED).position(same) {
-            return (self.attachments.len() - 1 - back) as u32;
-        }
-        let Self { list, influences, .. } = self;
-        let owner = &list[figure as usize];
-        let first = influences.len() as u32;
-        owner.dof.jacobian(at, &owner.q0, &mut |own_block, columns| {
-            let (block, size) = (owner.blocks[own_block], owner.dof.blocks()[own_block].rates);
-            influences.push(Influence { block, own_block: own_block as u32, size, columns: *columns });
-        });
-        let range = (first, influences.len() as u32);
-        let start = owner.dof.frame(at, &owner.q0, &owner.v0);
-        let movers = &influences[first as usize..];
-        let (mass, inverse_inertia) = (owner.mass_at(at, movers), owner.inverse_inertia_at(at, movers));
-        self.attachments.push(Attachment { figure, at, frozen, influences: range, start, mass, inverse_inertia });
-        self.attachments.len() as u32 - 1
-    }
-
-    /// Makes a frame, which does not turn, of a point between vertices. Answers its index among the attachments.
-    pub fn attach_foot(&mut self, figure: u32, foot: &Foot) -> u32 {
-        let Self { list, influences, .. } = self;
-        let owner = &list[figure as usize];
-        let first = influences.len();
-        let (mut position, mut velocity) = (DVec3::ZERO, DVec3::ZERO);
-        for &(at, weight) in foot.iter().filter(|(_, weight)| *weight > 0.0) {
-            let [place, moves] = owner.dof.point(at, &owner.q0, &owner.v0);
-            position += weight * place;
-            velocity += weight * moves;
-            owner.dof.jacobian(at, &owner.q0, &mut |own_block, columns| {
-                add_influence(influences, first, owner, own_block, weight, columns);
-            });
-        }
-        let range = (first as u32, influences.len() as u32);
-        let mass = owner.mass_at(foot[0].0, &influences[first..]);
-        // No other attachment is at the same place.
-        let at = PartPoint { part: ABSENT, point: position };
-        let start = Frame::point(position, velocity);
-        let (frozen, inverse_inertia) = (true, 0.0);
-        self.attachments.push(Attachment { figure, at, frozen, influences: range, start, mass, inverse_inertia });
-        self.attachments.len() as u32 - 1
-    }
-
-    /// How blocks move attachment `k`.
-    pub fn influences(&self, k: usize) -> &[Influence] {
-        let (start, end) = self.attachments[k].influences;
-        &self.influences[start as usize..end as usize]
-    }
-
-    /// Moves everything to the rates `u`. `frames` are the island's: one for each of the `u`, then the attachments'.
-    pub fn move_to<const D: usize>(&mut self, u: &[Entry<D>], dt: f64, frames: &mut Vec<Frame<f64>>) {
-        for figure in &mut self.list[..self.used] {
-            figure.move_to(u, dt, frames);
-        }
-        for attachment in &self.attachments {
-            let figure = &self.list[attachment.figure as usize];
-            let (start, end) = attachment.influences;
-            let influences = &mut self.influences[start as usize..end as usize];
-            frames.push(attachment.frame(figure, influences));
-        }
-    }
-
-    /// Whether one of the figures is made of parts.
-    pub fn have_parts(&self) -> bool {
-        self.list().iter().any(|figure| !figure.parts.is_empty())
-    }
-
-    /// Forgets the gradient on attachments.
-    pub fn begin_gradient(&mut self) {
-        self.wrenches.clear();
-        self.wrenches.resize(self.attachments.len(), Wrench::ZERO);
-    }
-
-    /// Adds to the gradient on attachment `k`.
-    pub fn push(&mut self, k: usize, wrench: Wrench) {
-        self.wrenches[k] += wrench;
-    }
-
-    /// Adds the figures' own residuals and everything that acts on attachments. Answers the energy.
-    pub fn evaluate<const D: usize>(
-        &mut self,
-        dt: f64,
-        gravity: Gravity,
-        frames: &[Frame<f64>],
-        residual: &mut [Entry<D>],
-    ) -> f64 {
-        let attached = &frames[residual.len()..];
-        let mut energy = 0.0;
-        for figure in &mut self.list[..self.used] {
-            energy += figure.evaluate(dt, gravity, attached, &mut self.wrenches, residual);
-        }
-        for k in 0..self.attachments.len() {
-            let wrench = self.wrenches[k].numbers();
-            for influence in self.influences(k) {
-                let entry = &mut residual[influence.block as usize];
-                for (entry, column) in entry.iter_mut().zip(&influence.columns) {
-                    *entry += (0..6).map(|i| column[i] * wrench[i]).sum::<f64>();
-                }
-            }
-        }
-        energy
-    }
-
-    /// Forgets the Hessian on attachments.
-    pub fn begin_hessian(&mut self) {
-        self.hessians.clear();
-        self.hessians.resize(self.attachments.len(), zero());
-    }
-
-    /// Adds to the Hessian on attachment `k`.
-    pub fn stiffen(&mut self, k: usize, block: &Block<6>, factor: f64) {
-        add_block(&mut self.hessians[k], block, factor);
-    }
-
-    /// Hands over the blocks of the figures' inertia, of their own potentials, and of what acts on single attachments.
-    pub fn assemble(&mut self, dt: f64, frames: &[Frame<f64>], blocks: &mut impl Blocks) {
-        let attached = &frames[frames.len() - self.attachments.len()..];
-        for (index, figure) in (0..).zip(&mut self.list[..self.used]) {
-            figure.load(index, &self.attachments, &self.wrenches, attached);
-            figure.stiffen_points(dt, self.definite);
-            match figure.dof.inertia() {
-                Inertia::Points(masses) => figure.assemble_points(masses, dt * dt, blocks),
-                Inertia::Parts(parts) => {
-                    for ((k, part), &geometric) in (figure.parts.start as usize..).zip(parts).zip(&figure.geometric) {
-                        let turning = world_inertia(&attached[k], part.inertia) + geometric * dt;
-                        add_block(&mut self.hessians[k], &inertia_block(part.mass, turning), 1.0);
-                    }
-                    figure.assemble_stiffness(dt, self.definite, blocks);
-                }
-            }
-        }
-        for (k, hessian) in self.hessians.iter().enumerate() {
-            let influences = self.influences(k);
-            for b in influences {
-                let half = multiplied(hessian, &b.columns);
-                for a in influences.iter().filter(|a| a.block >= b.block) {
-                    blocks.add(a.block, b.block, &projected(&a.columns, a.size, &half));
-                }
-            }
-        }
-    }
-
-    /// Hands `pair` every pair of different blocks that [`Figures::assemble`] touches.
-    pub fn couplings(&self, pair: &mut impl FnMut(u32, u32)) {
-        for figure in self.list() {
-            let blocks = &figure.blocks;
-            figure.dof.couplings(&mut |a, b| pair(blocks[a], blocks[b]));
-            if let Inertia::Points(masses) = figure.dof.inertia() {
-                masses.off_diagonal.iter().for_each(|&(a, b, _)| pair(blocks[a as usize], blocks[b as usize]));
-            }
-        }
-        for k in 0..self.attachments.len() {
-            let influences = self.influences(k);
-            for (i, a) in influences.iter().enumerate() {
-                influences[..i].iter().for_each(|b| pair(a.block, b.block));
-            }
-        }
-    }
-
-    /// Hands `pair` the two blocks of every pair of points, in the order in which [`Figures::assemble`] adds them.
-    pub fn point_pairs(&self, pair: &mut impl FnMut(u32, u32)) {
-        for figure in self.list() {
-            if let Inertia::Points(masses) = figure.dof.inertia() {
-                let blocks = &figure.blocks;
-                masses.off_diagonal.iter().for_each(|&(a, b, _)| pair(blocks[a as usize], blocks[b as usize]));
-            }
-        }
-    }
-}
-
 impl Figure {
-    fn new(dof: &Arc<dyn Dof>) -> Self {
+    pub fn new(dof: &Arc<dyn Dof>) -> Self {
         Self {
             dof: Arc::clone(dof),
             blocks: Vec::new(),
@@ -323,7 +64,7 @@ impl Figure {
         }
     }
 
-    fn start(&mut self, blocks: impl Iterator<Item = u32>, [q, v]: [&[f64]; 2], body: &FigureBody) {
+    pub fn start(&mut self, blocks: impl Iterator<Item = u32>, [q, v]: [&[f64]; 2], body: &FigureBody) {
         self.blocks.clear();
         self.blocks.extend(blocks);
         self.offsets.clear();
@@ -340,7 +81,7 @@ impl Figure {
         }
     }
 
-    fn prepare(&mut self, dt: f64) {
+    pub fn prepare(&mut self, dt: f64) {
         let mut prepared = std::mem::take(&mut self.prepared);
         prepared.clear();
         self.dof.prepare(&self.local_state(dt, false), &mut prepared);
@@ -355,7 +96,7 @@ impl Figure {
     }
 
     /// What resists a force at a material point, kg.
-    fn mass_at(&self, at: PartPoint, influences: &[Influence]) -> f64 {
+    pub fn mass_at(&self, at: PartPoint, influences: &[Influence]) -> f64 {
         match self.dof.inertia() {
             Inertia::Parts(parts) => parts[at.part as usize].mass,
             Inertia::Points(masses) => {
@@ -366,7 +107,7 @@ impl Figure {
     }
 
     /// What a torque turns at a material point, mean over axes, 1/(kg m²).
-    fn inverse_inertia_at(&self, at: PartPoint, influences: &[Influence]) -> f64 {
+    pub fn inverse_inertia_at(&self, at: PartPoint, influences: &[Influence]) -> f64 {
         let trace = match self.dof.inertia() {
             Inertia::Parts(parts) => trace(parts[at.part as usize].inertia.inverse()),
             Inertia::Points(masses) => {
@@ -383,7 +124,7 @@ impl Figure {
         LocalState { dt, q0, v0, q1, v1, controls, prepared, definite }
     }
 
-    fn move_to<const D: usize>(&mut self, u: &[Entry<D>], dt: f64, frames: &mut [Frame<f64>]) {
+    pub fn move_to<const D: usize>(&mut self, u: &[Entry<D>], dt: f64, frames: &mut [Frame<f64>]) {
         let mut v1 = std::mem::take(&mut self.v1);
         for (block, rates) in self.shares() {
             let size = rates.len();
@@ -399,7 +140,7 @@ impl Figure {
         }
     }
 
-    fn evaluate<const D: usize>(
+    pub fn evaluate<const D: usize>(
         &mut self,
         dt: f64,
         gravity: Gravity,
@@ -462,19 +203,19 @@ impl Figure {
     }
 
     /// Finds the geometric stiffness of what pulls at the candidate. Where derivatives are frozen there is none.
-    fn load(&mut self, index: u32, attachments: &[Attachment], wrenches: &[Wrench], attached: &[Frame<f64>]) {
+    pub fn load(&mut self, index: u32, attachments: &[Attachment], wrenches: &[Wrench], attached: &[Frame<f64>]) {
         let Self { dof, loads, geometric, parts, q1, .. } = self;
         loads.clear();
         geometric.clear();
         geometric.resize(parts.len(), DMat3::ZERO);
-        let mine = attachments.iter().zip(wrenches).filter(|(a, _)| a.figure == index && !a.frozen);
+        let mine = attachments.iter().zip(wrenches).filter(|(a, _)| a.figure == index && a.follows != Follows::Start);
         loads.extend(mine.map(|(attachment, wrench)| PartLoad { at: attachment.at, impulse: wrench.force.into() }));
         let centres = &attached[parts.start as usize..parts.end as usize];
         dof.geometric_stiffness(q1, centres, loads, &mut |part, stiffness| geometric[part] += stiffness);
     }
 
     /// Finds the stiffness of points.
-    fn stiffen_points(&mut self, dt: f64, definite: bool) {
+    pub fn stiffen_points(&mut self, dt: f64, definite: bool) {
         let Inertia::Points(masses) = self.dof.inertia() else { return };
         let sizes = [masses.diagonal.len(), masses.off_diagonal.len()];
         let (mut own, mut pairs) = (std::mem::take(&mut self.own_stiffness), std::mem::take(&mut self.pair_stiffness));
@@ -486,7 +227,7 @@ impl Figure {
         (self.own_stiffness, self.pair_stiffness) = (own, pairs);
     }
 
-    fn assemble_points(&self, masses: &PointMasses, factor: f64, blocks: &mut impl Blocks) {
+    pub fn assemble_points(&self, masses: &PointMasses, factor: f64, blocks: &mut impl Blocks) {
         for ((&block, &m), stiffness) in self.blocks.iter().zip(&masses.diagonal).zip(&self.own_stiffness) {
             blocks.add_point(block, block, &(*stiffness * factor), m);
         }
@@ -496,37 +237,11 @@ impl Figure {
         }
     }
 
-    fn assemble_stiffness(&self, dt: f64, definite: bool, blocks: &mut impl Blocks) {
+    pub fn assemble_stiffness(&self, dt: f64, definite: bool, blocks: &mut impl Blocks) {
         self.dof.stiffness(&self.local_state(dt, definite), &mut |row, column, block| {
             let scaled = block.map(|r| r.map(|x| x * dt * dt));
             blocks.add(self.blocks[row], self.blocks[column], &scaled);
         });
-    }
-}
-
-/// Adds how a block moves a vertex to the influences from `first` on; what does not move it is left out.
-fn add_influence(
-    influences: &mut Vec<Influence>,
-    first: usize,
-    owner: &Figure,
-    own_block: usize,
-    weight: f64,
-    columns: &Columns,
-) {
-    let size = owner.dof.blocks()[own_block].rates;
-    let linear = |column: &[f64; 6]| DVec3::from_slice(column) * weight;
-    if columns[..usize::from(size)].iter().all(|column| linear(column) == DVec3::ZERO) {
-        return;
-    }
-    let block = owner.blocks[own_block];
-    let known = influences[first..].iter().position(|influence| influence.block == block);
-    let place = known.map_or(influences.len(), |known| first + known);
-    if known.is_none() {
-        influences.push(Influence { block, own_block: own_block as u32, size, columns: Columns::default() });
-    }
-    for (sum, column) in influences[place].columns.iter_mut().zip(columns) {
-        let added = DVec3::from_slice(&sum[..]) + linear(column);
-        sum[..3].copy_from_slice(&added.to_array());
     }
 }
 

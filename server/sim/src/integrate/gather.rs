@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::attachment::trace;
+use super::attachment::{Follows, trace};
 use super::problem::{Rates, Unknown};
 use super::step::{Integrator, Scene, Solve};
 use super::wheels;
@@ -94,8 +94,8 @@ impl Integrator {
         self.solves.resize_with(self.islands.len().max(self.solves.len()), Solve::default);
     }
 
-    /// The island of two spots, and their ends in it; `None` where that has all its potentials already. `frozen` ends keep the derivatives of the start.
-    pub(super) fn localise(&mut self, spots: [Spot; 2], frozen: bool) -> Option<(&mut Solve, [End; 2])> {
+    /// The island of two spots, and their ends in it; `None` where that has all its potentials already.
+    pub(super) fn localise(&mut self, spots: [Spot; 2], follows: Follows) -> Option<(&mut Solve, [End; 2])> {
         let island = |spot: Spot| spot.body().map_or(Islands::FREE, |index| self.islands.island_of(index));
         let solve = self.solves.get_mut(island(spots[0]).min(island(spots[1])) as usize)?;
         if !solve.is_gathering {
@@ -106,7 +106,7 @@ impl Integrator {
             Spot::Body(index, at) => match self.active[index as usize] {
                 Active { start, figure: ABSENT, .. } => End { frame: start, point: at.point },
                 Active { figure, .. } => {
-                    let attachment = solve.problem.figures.attach(figure, at, frozen);
+                    let attachment = solve.problem.figures.attach(figure, at, follows);
                     End { frame: solve.problem.len() as u32 + attachment, point: DVec3::ZERO }
                 }
             },
@@ -119,10 +119,15 @@ impl Integrator {
         Some((solve, ends))
     }
 
-    /// As [`Integrator::localise`], for two anchors.
-    pub(super) fn localise_anchors(&mut self, scene: &Scene, anchors: [Anchor; 2]) -> Option<(&mut Solve, [End; 2])> {
+    /// As [`Integrator::localise`], for two anchors; [`Follows::Place`] where a potential asks for no axes.
+    pub(super) fn localise_anchors(
+        &mut self,
+        scene: &Scene,
+        anchors: [Anchor; 2],
+        follows: Follows,
+    ) -> Option<(&mut Solve, [End; 2])> {
         let spots = [spot(scene, anchors[0])?, spot(scene, anchors[1])?];
-        let (solve, mut ends) = self.localise(spots, false)?;
+        let (solve, mut ends) = self.localise(spots, follows)?;
         for (end, anchor) in ends.iter_mut().zip(anchors) {
             if end.frame == FIXED {
                 end.point = anchor.point;
@@ -136,19 +141,19 @@ impl Integrator {
         self.gather_second(scene);
         let Settings { dt, solver, .. } = scene.settings;
         for (_, desc) in scene.potentials.springs.awake() {
-            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b], Follows::Place) else { continue };
             let points = solve.places(ends);
             solve.problem.terms.springs.push(SpringTerm::new(ends, desc, points[0].distance(points[1])));
         }
         for (id, &Held { desc, memory }) in scene.potentials.rods.awake() {
-            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b], Follows::Place) else { continue };
             let scale = solve.scale(ends, solve.places(ends), solver.joint_stiffness);
             solve.problem.terms.rods.push(RodTerm::new(ends, [desc.length; 2], desc.tolerance, scale, memory));
             solve.rods.push(id);
         }
         self.gather_own_rods(scene);
         for (id, &Held { desc, memory }) in scene.potentials.ball_joints.awake() {
-            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b], Follows::Place) else { continue };
             let scale = solve.scale(ends, solve.places(ends), solver.joint_stiffness);
             solve.problem.terms.ball_joints.push(BallJointTerm::new(ends, desc.tolerance, scale, memory));
             solve.ball_joints.push(id);
@@ -157,7 +162,7 @@ impl Integrator {
         self.gather_axles(scene);
         for (_, (desc, gains)) in scene.potentials.pds.awake() {
             let anchors = [desc.at, Anchor::world(DVec3::ZERO)];
-            let Some((solve, [end, _])) = self.localise_anchors(scene, anchors) else { continue };
+            let Some((solve, [end, _])) = self.localise_anchors(scene, anchors, Follows::Place) else { continue };
             let (mass, start) = (solve.mass(end), solve.start(end).place(end.point));
             solve.problem.terms.pds.push(PdTerm::new(end, desc, *gains, mass, start, *dt));
         }
@@ -194,7 +199,7 @@ impl Integrator {
             let sources = (source..).take(points.len());
             source += points.len() as u32;
             let Some(spots) = contact_spots(scene, &points[0]) else { continue };
-            let Some((solve, ends)) = self.localise(spots, true) else { continue };
+            let Some((solve, ends)) = self.localise(spots, Follows::Start) else { continue };
             let (frames, mass) = (ends.map(|end| end.frame), solve.reduced_mass(ends));
             let (origins, turns) = (ends.map(|end| solve.origin(end)), ends.map(|end| solve.turns(end)));
             let (now, free) = (ends.map(|end| solve.start_twist(end)), ends.map(|end| solve.free_twist(end)));
@@ -226,7 +231,7 @@ impl Integrator {
     fn gather_second(&mut self, scene: &Scene) {
         for (point, source) in scene.second.iter().zip(0..) {
             let Some(spots) = contact_spots(scene, &point.contact) else { continue };
-            let Some((solve, ends)) = self.localise(spots, true) else { continue };
+            let Some((solve, ends)) = self.localise(spots, Follows::Start) else { continue };
             let (frames, mass) = (ends.map(|end| end.frame), solve.reduced_mass(ends));
             let arm = |i: usize| if solve.turns(ends[i]) { point.arms[i] } else { DVec3::ZERO };
             let Settings { dt, contact: settings, .. } = scene.settings;

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::attachment::Follows;
 use super::step::{Integrator, Scene, Solve};
 use crate::potential::alignment::{Aligned, Alignment, Captured};
 use crate::potential::anti_roll_bar::AntiRollTerm;
@@ -19,7 +20,7 @@ impl Integrator {
     pub(super) fn gather_joints(&mut self, scene: &Scene) {
         let least = scene.settings.solver.joint_stiffness;
         for (id, &Held { desc: Captured { desc, axes: [axis, _] }, memory }) in scene.potentials.hinges.awake() {
-            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b], Follows::Figure) else { continue };
             let scale = solve.scale(ends, solve.places(ends), least);
             let place = BallJointTerm::new(ends, desc.tolerance, scale, memory);
             let mut turns = Alignment::new([axis], desc.tilt, solve.turn_scale(ends, least), memory);
@@ -30,7 +31,7 @@ impl Integrator {
             solve.hinges.push(id);
         }
         for (id, &Held { desc, memory }) in scene.potentials.universal_joints.awake() {
-            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b], Follows::Figure) else { continue };
             let scale = solve.scale(ends, solve.places(ends), least);
             let place = BallJointTerm::new(ends, desc.tolerance, scale, memory);
             let axes = [desc.axis_a.normalize(), desc.axis_b.normalize()];
@@ -39,7 +40,7 @@ impl Integrator {
             solve.universal_joints.push(id);
         }
         for (id, &Held { desc: Captured { desc, axes }, memory }) in scene.potentials.fixed_joints.awake() {
-            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b], Follows::Figure) else { continue };
             let scale = solve.scale(ends, solve.places(ends), least);
             let place = BallJointTerm::new(ends, desc.tolerance, scale, memory);
             let turns = Alignment::new(axes, desc.tilt, solve.turn_scale(ends, least), memory);
@@ -47,7 +48,7 @@ impl Integrator {
             solve.fixed_joints.push(id);
         }
         for (id, &Held { desc: Captured { desc, axes }, memory }) in scene.potentials.sliders.awake() {
-            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b], Follows::Figure) else { continue };
             let scale = solve.scale(ends, solve.places(ends), least);
             let place = LineTerm::new(ends, axes[0][0], desc.tolerance, scale, memory);
             let turns = Alignment::new(axes, desc.tilt, solve.turn_scale(ends, least), memory);
@@ -61,7 +62,7 @@ impl Integrator {
     fn gather_limits(&mut self, scene: &Scene) {
         let least = scene.settings.solver.joint_stiffness;
         for (id, &Held { desc, memory }) in scene.potentials.distance_limits.awake() {
-            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b]) else { continue };
+            let Some((solve, ends)) = self.localise_anchors(scene, [desc.a, desc.b], Follows::Place) else { continue };
             let scale = solve.scale(ends, solve.places(ends), least);
             let term = RodTerm::new(ends, [desc.at_least, desc.at_most], desc.tolerance, scale, memory);
             solve.problem.terms.distance_limits.push(term);
@@ -69,7 +70,9 @@ impl Integrator {
         }
         for (id, &Held { desc, memory }) in scene.potentials.angle_limits.awake() {
             let Captured { desc: hinge, axes } = scene.potentials.hinges[desc.hinge].desc;
-            let Some((solve, ends)) = self.localise_anchors(scene, [hinge.a, hinge.b]) else { continue };
+            let Some((solve, ends)) = self.localise_anchors(scene, [hinge.a, hinge.b], Follows::Figure) else {
+                continue;
+            };
             let frames = ends.map(|end| end.frame);
             let term = AngleLimitTerm::new(frames, axes, &desc, solve.turn_scale(ends, least), memory);
             solve.problem.terms.angle_limits.push(term);
@@ -93,7 +96,7 @@ impl Integrator {
                     None => continue,
                 },
             };
-            let Some((solve, ends)) = self.localise_anchors(scene, anchors) else { continue };
+            let Some((solve, ends)) = self.localise_anchors(scene, anchors, Follows::Figure) else { continue };
             let (frames, starts) = (ends.map(|end| end.frame), ends.map(|end| solve.start(end)));
             let axis: DVec3 = starts[0].arm(axis).into();
             let term = match joint {
@@ -141,6 +144,10 @@ impl Integrator {
     }
 
     fn localise_axle(&mut self, scene: &Scene, axle: &AxleDesc) -> Option<(&mut Solve, [End; 2])> {
-        self.localise_anchors(scene, [axle.chassis, axle.wheel].map(|id| Anchor::body(id, DVec3::ZERO)))
+        self.localise_anchors(
+            scene,
+            [axle.chassis, axle.wheel].map(|id| Anchor::body(id, DVec3::ZERO)),
+            Follows::Figure,
+        )
     }
 }

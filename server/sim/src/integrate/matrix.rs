@@ -4,7 +4,7 @@
 //! factorisations. Stored are the diagonal and the lower triangle, row by row, columns ascending.
 
 use super::block::{Block, Entry, multiply_add, transpose, transposed_multiply_add, zero};
-use super::figure::{Blocks, Figures};
+use super::figures::{Blocks, Figures};
 use super::problem::{Problem, Unknown, Visitor, pair};
 use super::pull_back::{multiplied, projected};
 use super::solver::work::block;
@@ -80,7 +80,7 @@ impl<const D: usize> Matrix<D> {
     }
 
     /// Adds the leading part of `factor` × `block` at (row, column), or its transpose where that is the stored half.
-    fn add(&mut self, row: u32, column: u32, block: &Block<6>, factor: f64) {
+    fn add<const R: usize>(&mut self, row: u32, column: u32, block: &Block<R>, factor: f64) {
         if row == column {
             return add_scaled(&mut self.diagonal[row as usize], block, factor);
         }
@@ -211,7 +211,7 @@ struct OfFigures<'a, const D: usize> {
 }
 
 impl<const D: usize> Blocks for OfFigures<'_, D> {
-    fn add(&mut self, row: u32, column: u32, block: &Block<6>) {
+    fn add<const R: usize>(&mut self, row: u32, column: u32, block: &Block<R>) {
         self.matrix.add(row, column, block, 1.0);
     }
 
@@ -292,8 +292,8 @@ impl<const D: usize> Assemble<'_, D> {
     }
 }
 
-/// target += factor source, the leading D×D part of it.
-fn add_scaled<const D: usize>(target: &mut Block<D>, source: &Block<6>, factor: f64) {
+/// target += factor source, the part that both have.
+fn add_scaled<const D: usize, const R: usize>(target: &mut Block<D>, source: &Block<R>, factor: f64) {
     for (target, source) in target.iter_mut().zip(source) {
         for (target, source) in target.iter_mut().zip(source) {
             *target += factor * source;

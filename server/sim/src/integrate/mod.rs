@@ -9,6 +9,7 @@ pub(crate) mod block;
 mod conjugate_gradient;
 mod factorization;
 pub(crate) mod figure;
+mod figures;
 mod friction_tangent;
 mod gather;
 mod gather_joints;

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::block::{Block, Entry};
-use super::figure::{Blocks, Figures};
+use super::figures::{Blocks, Figures};
 use crate::autodiff::Dual;
 use crate::dof::{BLOCK_RATES_MAX, Frame, Node, Twist};
 use crate::potential::anti_roll_bar::AntiRollTerm;
@@ -426,8 +426,8 @@ impl<const D: usize> TimesVector<'_, D> {
 }
 
 impl<const D: usize> Blocks for TimesVector<'_, D> {
-    fn add(&mut self, row: u32, column: u32, block: &Block<6>) {
-        for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+    fn add<const R: usize>(&mut self, row: u32, column: u32, block: &Block<R>) {
+        for (i, j) in (0..D.min(R)).flat_map(|i| (0..D.min(R)).map(move |j| (i, j))) {
             self.add_entry(row, column, (i, j), block[i][j]);
         }
     }

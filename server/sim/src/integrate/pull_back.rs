@@ -2,19 +2,14 @@
 
 use glam::DMat3;
 
+use super::attachment::Influence;
 use super::block::{Block, zero};
+use super::figures::Blocks;
 use crate::dof::Columns;
 
 /// H B, B the derivatives of a frame.
 pub(super) fn multiplied(h: &Block<6>, columns: &Columns) -> Block<6> {
-    let rows: Block<6> = std::array::from_fn(|l| std::array::from_fn(|j| columns[j][l]));
-    let mut product = zero();
-    for (product, h) in product.iter_mut().zip(h) {
-        for (h, row) in h.iter().zip(&rows) {
-            add_row(product, row, *h);
-        }
-    }
-    product
+    product::<6, 6>(h, columns)
 }
 
 /// Aᵀ M, A the derivatives of a frame with respect to the first `size` rates of a block.
@@ -28,12 +23,51 @@ pub(super) fn projected(columns: &Columns, size: u8, m: &Block<6>) -> Block<6> {
     product
 }
 
+/// Hands over Jᵀ H J of a frame that `movers` move; of a place only the upper left quarter of H counts.
+pub(super) fn pull_back(h: &Block<6>, is_place: bool, movers: &[Influence], blocks: &mut impl Blocks) {
+    let points = movers.iter().all(|mover| mover.size <= 3);
+    match (is_place, points) {
+        (true, true) => pull_back_part::<3, 3>(h, movers, blocks),
+        (true, false) => pull_back_part::<3, 6>(h, movers, blocks),
+        (false, true) => pull_back_part::<6, 3>(h, movers, blocks),
+        (false, false) => pull_back_part::<6, 6>(h, movers, blocks),
+    }
+}
+
+/// The same with the first L rows of frames, for blocks of R rates or fewer.
+fn pull_back_part<const L: usize, const R: usize>(h: &Block<6>, movers: &[Influence], blocks: &mut impl Blocks) {
+    for b in movers {
+        let half = product::<L, R>(h, &b.columns);
+        for a in movers.iter().filter(|a| a.block >= b.block) {
+            let mut block: Block<R> = zero();
+            for (row, column) in block.iter_mut().zip(&a.columns).take(usize::from(a.size)) {
+                for (x, half) in column.iter().zip(&half) {
+                    add_row(row, half, *x);
+                }
+            }
+            blocks.add(a.block, b.block, &block);
+        }
+    }
+}
+
+/// H B, the first L rows of both and R columns.
+fn product<const L: usize, const R: usize>(h: &Block<6>, columns: &Columns) -> [[f64; R]; L] {
+    let rows: [[f64; R]; L] = std::array::from_fn(|l| std::array::from_fn(|j| columns[j][l]));
+    let mut product = [[0.0; R]; L];
+    for (product, h) in product.iter_mut().zip(h) {
+        for (h, row) in h.iter().zip(&rows) {
+            add_row(product, row, *h);
+        }
+    }
+    product
+}
+
 /// target += factor source.
 pub(super) fn add_block(target: &mut Block<6>, source: &Block<6>, factor: f64) {
     target.iter_mut().zip(source).for_each(|(target, source)| add_row(target, source, factor));
 }
 
-fn add_row(target: &mut [f64; 6], source: &[f64; 6], factor: f64) {
+fn add_row<const R: usize>(target: &mut [f64; R], source: &[f64; R], factor: f64) {
     for (target, source) in target.iter_mut().zip(source) {
         *target += factor * source;
     }

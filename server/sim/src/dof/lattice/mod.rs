@@ -24,7 +24,7 @@ pub use rest_shape::RestShape;
 
 use super::embedding::EmbeddedPoint;
 use super::interface::{BlockSize, Columns, Dof, Inertia, LocalState, PartPoint, PointMasses};
-use super::nodal::{Nodes, SharedMass, Slot, require_damping, viscosity};
+use super::nodal::{Nodes, SharedMass, Slot, moved_by_nodes, require_damping, viscosity};
 use super::{DofKind, Frame, Mount};
 use crate::collide::{EmbeddedHull, Material};
 use crate::error::{SimError, require, require_vector};
@@ -262,36 +262,10 @@ impl Dof for Lattice {
         DofKind::Lattice
     }
 
-    fn blocks(&self) -> &[BlockSize] {
-        &self.nodes.blocks
-    }
+    moved_by_nodes!();
 
     fn parts(&self) -> u32 {
         self.cells.len() as u32
-    }
-
-    fn frame(&self, at: PartPoint, q: &[f64], v: &[f64]) -> Frame<f64> {
-        let (nodes, point) = self.embedded(at);
-        self.nodes.frame(nodes, &point, [q, v])
-    }
-
-    fn point(&self, at: PartPoint, q: &[f64], v: &[f64]) -> [DVec3; 2] {
-        let (nodes, point) = self.embedded(at);
-        self.nodes.point(nodes, &point, [q, v])
-    }
-
-    fn jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns)) {
-        let (nodes, point) = self.embedded(at);
-        self.nodes.jacobian(nodes, &point, q, visit);
-    }
-
-    fn mount(&self, at: PartPoint) -> Option<Mount> {
-        let (nodes, point) = self.embedded(at);
-        Some(self.nodes.mount(nodes, &point))
-    }
-
-    fn inertia(&self) -> Inertia<'_> {
-        Inertia::Points(&self.nodes.masses)
     }
 
     /// The numbers of a [`RestShape`].

@@ -135,9 +135,46 @@ impl Embedding {
                 }
             }
             Self::Tetrahedron { first, weights } => {
-                let columns = between_four(first, weights, local).columns(&[0, 1, 2, 3].map(q));
-                columns.iter().enumerate().for_each(|(point, columns)| visit(point, columns));
+                between_four(first, weights, local).columns(&[0, 1, 2, 3].map(q), visit);
             }
+        }
+    }
+
+    /// Both at once.
+    pub fn frame_and_jacobian(
+        &self,
+        local: DVec3,
+        q: impl Fn(usize) -> DVec3,
+        v: impl Fn(usize) -> DVec3,
+        visit: impl FnMut(usize, &Columns),
+    ) -> Frame<f64> {
+        if let Self::Tetrahedron { first, weights } = *self {
+            let point = between_four(first, weights, local);
+            return point.frame_and_columns(&[0, 1, 2, 3].map(q), &[0, 1, 2, 3].map(v), visit);
+        }
+        self.jacobian(local, &q, visit);
+        self.frame(local, q, v)
+    }
+
+    /// Place and velocity at `local`.
+    pub fn point(&self, local: DVec3, q: impl Fn(usize) -> DVec3, v: impl Fn(usize) -> DVec3) -> [DVec3; 2] {
+        if let Self::Tetrahedron { first, weights } = *self {
+            return between_four(first, weights, local).place(&[0, 1, 2, 3].map(q), &[0, 1, 2, 3].map(v));
+        }
+        let frame = self.frame(local, q, v);
+        [frame.position.into(), frame.linear.into()]
+    }
+
+    /// Whether places are linear in those of the points: what is off a line swings about it.
+    pub fn is_linear(&self) -> bool {
+        !matches!(self, Self::Line { .. })
+    }
+
+    /// As [`Embedding::jacobian`], of the place alone, where that is linear.
+    pub fn place_jacobian(&self, local: DVec3, q: impl Fn(usize) -> DVec3, visit: impl FnMut(usize, &Columns)) {
+        match *self {
+            Self::Tetrahedron { first, weights } => between_four(first, weights, local).place_columns(visit),
+            _ => self.jacobian(local, q, visit),
         }
     }
 }

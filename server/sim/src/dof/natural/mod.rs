@@ -73,6 +73,12 @@ impl Natural {
         let points = &self.desc.parts[part as usize].points;
         move |i| DVec3::from_slice(&numbers[3 * points[i] as usize..])
     }
+
+    /// Tells `visit` of a part's points by their numbers among all.
+    fn numbered(&self, part: u32, visit: &mut dyn FnMut(usize, &Columns)) -> impl FnMut(usize, &Columns) {
+        let points = &self.desc.parts[part as usize].points;
+        move |i, columns| visit(points[i] as usize, columns)
+    }
 }
 
 impl Dof for Natural {
@@ -104,9 +110,32 @@ impl Dof for Natural {
     }
 
     fn jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns)) {
-        let points = &self.desc.parts[at.part as usize].points;
         let embedding = &self.embeddings[at.part as usize];
-        embedding.jacobian(at.point, self.of_points(at.part, q), |i, columns| visit(points[i] as usize, columns));
+        embedding.jacobian(at.point, self.of_points(at.part, q), self.numbered(at.part, visit));
+    }
+
+    fn frame_and_jacobian(
+        &self,
+        at: PartPoint,
+        q: &[f64],
+        v: &[f64],
+        visit: &mut dyn FnMut(usize, &Columns),
+    ) -> Frame<f64> {
+        let (q, v) = (self.of_points(at.part, q), self.of_points(at.part, v));
+        self.embeddings[at.part as usize].frame_and_jacobian(at.point, q, v, self.numbered(at.part, visit))
+    }
+
+    fn point(&self, at: PartPoint, q: &[f64], v: &[f64]) -> [DVec3; 2] {
+        self.embeddings[at.part as usize].point(at.point, self.of_points(at.part, q), self.of_points(at.part, v))
+    }
+
+    fn is_linear(&self, at: PartPoint) -> bool {
+        self.embeddings[at.part as usize].is_linear()
+    }
+
+    fn place_jacobian(&self, at: PartPoint, q: &[f64], visit: &mut dyn FnMut(usize, &Columns)) {
+        let embedding = &self.embeddings[at.part as usize];
+        embedding.place_jacobian(at.point, self.of_points(at.part, q), self.numbered(at.part, visit));
     }
 
     fn mount(&self, at: PartPoint) -> Option<Mount> {

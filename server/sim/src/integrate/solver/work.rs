@@ -15,7 +15,7 @@
 //! The last three are not block products, but about as dear; patterns and symbolic factorisations are whole-number work
 //! and not counted.
 
-use super::super::figure::Figures;
+use super::super::figures::Figures;
 use super::super::problem::{Problem, Visitor};
 use crate::potential::{FIXED, FrameIndex, Term};
 
