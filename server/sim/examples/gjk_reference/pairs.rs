@@ -175,9 +175,19 @@ impl Pairs {
         // Where both are is no matter, except to rounding.
         let middle = self.vector(100.0);
         [(); 2].map(|()| {
-            let (shape, at, rotation) = (shape(self), middle + self.vector(reach), self.rotation());
+            let (shape, at, rotation) = (self.accepted(shape), middle + self.vector(reach), self.rotation());
             Item::new(shape, at, rotation)
         })
+    }
+
+    /// A shape that the engine takes: it refuses a hull as flat as a sheet without a radius by name.
+    fn accepted(&mut self, shape: fn(&mut Self) -> Shape) -> Shape {
+        loop {
+            let shape = shape(self);
+            if shape.validate().is_ok() {
+                return shape;
+            }
+        }
     }
 
     fn half(&mut self) -> DVec3 {

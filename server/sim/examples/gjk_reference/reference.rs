@@ -92,8 +92,8 @@ pub fn signed_distance(a: &Solid, b: &Solid) -> Answer {
         }
     }
     let (depth, normal) = least_overlap(&a.core, &b.core);
-    // A round core's is an upper bound.
-    Answer { gap: depth - radii, normal, uncertainty: 0.0 }
+    // A round core's is an upper bound. Of cores that are apart it is no distance at all.
+    Answer { gap: depth - radii, normal, uncertainty: depth.max(0.0) }
 }
 
 fn size(core: &Core) -> f64 {
@@ -137,8 +137,14 @@ fn minimum_norm(a: &Core, b: &Core) -> DVec3 {
             best = x;
         }
         if corral.len() == 4 {
-            // The origin is inside.
-            return DVec3::ZERO;
+            if x.length_squared() <= 1e-20 * scale {
+                // The origin is inside.
+                return DVec3::ZERO;
+            }
+            // Rounding: four points as good as in a plane.
+            let least = (0..4).min_by(|&i, &j| weights[i].total_cmp(&weights[j])).unwrap_or(0);
+            corral.swap_remove(least);
+            weights.swap_remove(least);
         }
     }
     best

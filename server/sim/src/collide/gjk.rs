@@ -20,6 +20,12 @@ const POLISHING_MAX: u32 = 600;
 /// Crosses of directions that are tried before the step is halved.
 const TURNS: u32 = 4;
 
+/// Of a simplex that encloses a volume.
+const SIMPLEX_DIMENSION: usize = 3;
+
+/// Normals that are tried around a line in which the origin lies.
+const AROUND_A_LINE: u32 = 32;
+
 /// rad; no two crosses are alike.
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
@@ -104,16 +110,48 @@ impl Pair<'_> {
         simplex.reset(CsoPoint::from_shapes(self.b_in_a, self.a, self.b, start));
         let (on_a, on_b, normal) = match closest_points(self.b_in_a, self.a, self.b, within, true, simplex) {
             GJKResult::ClosestPoints(on_a, on_b, normal) => (on_a, on_b, normal),
-            GJKResult::Intersection => epa.closest_points(self.b_in_a, self.a, self.b, simplex)?,
+            GJKResult::Intersection => return Some(Found::Nearest(self.overlap(simplex, epa)?)),
             // It says so too where it gave up.
             GJKResult::NoIntersection(normal) if self.separation(normal) > within => {
                 return Some(Found::Beyond(normal));
             }
             GJKResult::NoIntersection(_) | GJKResult::Proximity(_) => return None,
         };
+        Some(Found::Nearest(self.proposed(on_a, on_b, normal)?))
+    }
+
+    /// A proposal with its separation, if it is one.
+    fn proposed(&self, on_a: DVec3, on_b: DVec3, normal: DVec3) -> Option<Nearest> {
         let normal = normal.try_normalize()?;
-        (on_a.is_finite() && on_b.is_finite())
-            .then(|| Found::Nearest(Nearest { normal, gap: self.separation(normal), on_a, on_b }))
+        let gap = self.separation(normal);
+        (on_a.is_finite() && on_b.is_finite()).then_some(Nearest { normal, gap, on_a, on_b })
+    }
+
+    /// What EPA says of cores that overlap.
+    ///
+    /// GJK may say so of cores that but touch, too. Then the origin is on the rim of the simplex that EPA begins with, and
+    /// EPA may lose the face next to it to rounding: the next nearest, half a metre away, is as consistent as the right one
+    /// is. But no normal separates by more than the right one does. So EPA begins twice where the simplex is flat, with its
+    /// points in another order, and its answers are compared with the normals of the simplex itself.
+    fn overlap(&self, simplex: &mut VoronoiSimplex, epa: &mut EPA) -> Option<Nearest> {
+        let mut expand = |simplex: &VoronoiSimplex| {
+            let (on_a, on_b, normal) = epa.closest_points(self.b_in_a, self.a, self.b, simplex)?;
+            self.proposed(on_a, on_b, normal)
+        };
+        let mut best = expand(simplex);
+        let touching = touching(simplex);
+        if simplex.dimension() > 0 && touching.is_some() {
+            simplex.swap(0, 1);
+            best = wider(best, expand(simplex), 0.0);
+        }
+        for normal in normals(simplex) {
+            let other = match touching {
+                Some([on_a, on_b]) => self.proposed(on_a, on_b, normal),
+                None => Some(self.along(normal)),
+            };
+            best = wider(best, other, AGREEMENT);
+        }
+        best
     }
 
     /// What a normal by itself says.
@@ -149,6 +187,40 @@ impl Pair<'_> {
         }
         if best.normal == from.normal { from } else { self.along(best.normal) }
     }
+}
+
+/// The second of two answers where it is wider by more than `by`, m: no normal separates by more than the right one.
+fn wider(first: Option<Nearest>, second: Option<Nearest>, by: f64) -> Option<Nearest> {
+    match (first, second) {
+        (Some(first), Some(second)) if second.gap > first.gap + by => Some(second),
+        (first, second) => first.or(second),
+    }
+}
+
+/// The points of both cores at the origin of a flat simplex, on which it lies.
+fn touching(simplex: &VoronoiSimplex) -> Option<[DVec3; 2]> {
+    let count = simplex.dimension() + 1;
+    (count <= SIMPLEX_DIMENSION).then(|| {
+        let mean = |of: fn(&CsoPoint) -> DVec3| (0..count).map(|i| of(simplex.point(i)) * simplex.proj_coord(i)).sum();
+        [mean(|point| point.orig1), mean(|point| point.orig2)]
+    })
+}
+
+/// Normals of a simplex's faces, both ways; of a line, some around it.
+fn normals(simplex: &VoronoiSimplex) -> impl Iterator<Item = DVec3> {
+    let point = |i: usize| simplex.point(i).point;
+    let count = simplex.dimension() + 1;
+    let corners = (2..count).flat_map(|k| (1..k).flat_map(move |j| (0..j).map(move |i| [i, j, k])));
+    let faces = corners.filter_map(move |[i, j, k]| (point(j) - point(i)).cross(point(k) - point(i)).try_normalize());
+    let line = if count == 2 { (point(1) - point(0)).try_normalize() } else { None };
+    let around = line.into_iter().flat_map(|line| {
+        let (u, v) = line.any_orthonormal_pair();
+        (0..AROUND_A_LINE / 2).map(move |i| {
+            let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / f64::from(AROUND_A_LINE)).sin_cos();
+            u * cos + v * sin
+        })
+    });
+    faces.chain(around).flat_map(|normal| [normal, -normal])
 }
 
 impl Nearest {
