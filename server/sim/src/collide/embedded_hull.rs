@@ -2,7 +2,7 @@
 //!
 //! Owns what such a hull is, where it is in a tick, and of which vertices a point of its surface is made. Detection sees
 //! the hull of where the vertices are; what pushes it pushes the vertices beneath, through the Jacobians of their
-//! embedding. A vertex has no axes: friction acts on the core, deeper than the surface by the extrusion radius.
+//! embedding, those of how the body turns there included: friction has the extrusion radius for a lever.
 
 use arrayvec::ArrayVec;
 use glam::{DMat3, DVec3};

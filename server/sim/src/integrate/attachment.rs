@@ -1,6 +1,6 @@
 //! Material points of figures at which something acts: frames of an island beside those of its blocks.
 
-use glam::{DMat3, DVec3};
+use glam::DMat3;
 
 use super::figure::Figure;
 use crate::dof::{Columns, Frame, PartPoint, Twist};
@@ -47,7 +47,10 @@ impl Attachment {
     /// The frame at the figure's candidate state; refreshes derivatives that change.
     pub fn frame(&self, figure: &Figure, influences: &mut [Influence]) -> Frame<f64> {
         match self.follows {
-            Follows::Start => self.moved_by(figure, influences),
+            Follows::Start => {
+                let Twist { linear, angular } = figure.twist(influences, &figure.v1);
+                Frame { linear: linear.into(), angular: angular.into(), ..self.start }
+            }
             Follows::Place => {
                 let [position, velocity] = figure.dof.point(self.at, &figure.q1, &figure.v1);
                 Frame::point(position, velocity)
@@ -61,19 +64,6 @@ impl Attachment {
                 })
             }
         }
-    }
-
-    /// The frame of the start with the twist of now.
-    fn moved_by(&self, figure: &Figure, influences: &[Influence]) -> Frame<f64> {
-        let mut twist = Twist::REST;
-        for influence in influences {
-            let rates = &figure.v1[figure.offsets[influence.own_block as usize] as usize..];
-            for (column, &rate) in influence.columns.iter().zip(&rates[..usize::from(influence.size)]) {
-                twist.linear += DVec3::from_slice(column) * rate;
-                twist.angular += DVec3::from_slice(&column[3..]) * rate;
-            }
-        }
-        Frame { linear: twist.linear.into(), angular: twist.angular.into(), ..self.start }
     }
 }
 

@@ -95,6 +95,19 @@ impl Figure {
         self.blocks.iter().map(|&block| block as usize).zip(ranges)
     }
 
+    /// The twist that rates give what `influences` move.
+    pub fn twist(&self, influences: &[Influence], rates: &[f64]) -> Twist {
+        let mut twist = Twist::REST;
+        for influence in influences {
+            let rates = &rates[self.offsets[influence.own_block as usize] as usize..];
+            for (column, &rate) in influence.columns.iter().zip(&rates[..usize::from(influence.size)]) {
+                twist.linear += DVec3::from_slice(column) * rate;
+                twist.angular += DVec3::from_slice(&column[3..]) * rate;
+            }
+        }
+        twist
+    }
+
     /// What resists a force at a material point, kg.
     pub fn mass_at(&self, at: PartPoint, influences: &[Influence]) -> f64 {
         match self.dof.inertia() {

@@ -9,7 +9,7 @@ use super::block::{Block, Entry, zero};
 use super::figure::{Figure, part_momentum, world_inertia};
 use super::pull_back::{add_block, inertia_block, pull_back};
 use crate::collide::Foot;
-use crate::dof::{ABSENT, Columns, FigureBody, Frame, Inertia, PartPoint};
+use crate::dof::{ABSENT, Columns, FigureBody, Frame, Inertia, PartPoint, Twist};
 use crate::potential::Wrench;
 use crate::potential::gravity::Gravity;
 
@@ -128,26 +128,28 @@ impl Figures {
         attachments.len() as u32 - 1
     }
 
-    /// Makes a frame, which does not turn, of a point between vertices. Answers its index among the attachments.
+    /// Makes a frame of a point between vertices, which turns as the body does there. Answers its index among the
+    /// attachments.
     pub fn attach_foot(&mut self, figure: u32, foot: &Foot) -> u32 {
         let Self { list, influences, .. } = self;
         let owner = &list[figure as usize];
         let first = influences.len();
-        let (mut position, mut velocity) = (DVec3::ZERO, DVec3::ZERO);
+        let mut position = DVec3::ZERO;
         for &(at, weight) in foot.iter().filter(|(_, weight)| *weight > 0.0) {
-            let [place, moves] = owner.dof.point(at, &owner.q0, &owner.v0);
-            position += weight * place;
-            velocity += weight * moves;
-            owner.dof.place_jacobian(at, &owner.q0, &mut |own_block, columns| {
+            position += weight * owner.dof.point(at, &owner.q0, &owner.v0)[0];
+            owner.dof.jacobian(at, &owner.q0, &mut |own_block, columns| {
                 add_influence(influences, first, owner, own_block, weight, columns);
             });
         }
         let range = (first as u32, influences.len() as u32);
-        let mass = owner.mass_at(foot[0].0, &influences[first..]);
+        let movers = &influences[first..];
+        let vertex = foot[0].0;
+        let (mass, inverse_inertia) = (owner.mass_at(vertex, movers), owner.inverse_inertia_at(vertex, movers));
         // No other attachment is at the same place.
         let at = PartPoint { part: ABSENT, point: position };
-        let start = Frame::point(position, velocity);
-        let (follows, inverse_inertia) = (Follows::Start, 0.0);
+        let Twist { linear, angular } = owner.twist(movers, &owner.v0);
+        let start = Frame { angular: angular.into(), ..Frame::point(position, linear) };
+        let follows = Follows::Start;
         self.attachments.push(Attachment { figure, at, follows, influences: range, start, mass, inverse_inertia });
         self.attachments.len() as u32 - 1
     }
@@ -283,8 +285,7 @@ fn add_influence(
     columns: &Columns,
 ) {
     let size = owner.dof.blocks()[own_block].rates;
-    let linear = |column: &[f64; 6]| DVec3::from_slice(column) * weight;
-    if columns[..usize::from(size)].iter().all(|column| linear(column) == DVec3::ZERO) {
+    if columns[..usize::from(size)].iter().flatten().all(|&x| x == 0.0) {
         return;
     }
     let block = owner.blocks[own_block];
@@ -293,8 +294,6 @@ fn add_influence(
     if known.is_none() {
         influences.push(Influence { block, own_block: own_block as u32, size, columns: Columns::default() });
     }
-    for (sum, column) in influences[place].columns.iter_mut().zip(columns) {
-        let added = DVec3::from_slice(&sum[..]) + linear(column);
-        sum[..3].copy_from_slice(&added.to_array());
-    }
+    let sums = influences[place].columns.iter_mut().flatten();
+    sums.zip(columns.iter().flatten()).for_each(|(sum, x)| *sum += weight * x);
 }

@@ -216,6 +216,36 @@ fn a_creature_of_capsules_walks_into_a_wall() {
     assert!((hit.point.y - 0.95).abs() < 0.01, "{hit:?}");
 }
 
+/// Friction at the surface has the extrusion radius for a lever: what slides on one vertex with a radius comes to roll.
+#[test]
+fn a_vertex_with_a_radius_rolls() {
+    const REACH: f64 = 0.3;
+    let middle = PartPoint { part: 0, point: DVec3::ZERO };
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|corner| (corner - DVec3::splat(0.25)) * 0.4);
+    let mass = Shape::Ball { radius: REACH }.mass_properties(Density::constant(500.0)).unwrap();
+    let part = NaturalPart {
+        name: "ball".into(),
+        points: vec![0, 1, 2, 3],
+        position: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        mass,
+    };
+    let desc = NaturalDesc { points: corners.to_vec(), rods: Vec::new(), parts: vec![part] };
+    let ball = Natural::new(desc.with_edges()).unwrap();
+    let mut world = World::new(Settings { sleep: None, ..Settings::at(DT) }).unwrap();
+    ground(&mut world);
+    let q = ball.placed(DVec3::Y * REACH, DQuat::IDENTITY);
+    let v = ball.moving(&q, DVec3::Y * REACH, DVec3::X * 4.0, DVec3::ZERO);
+    let desc = FigureDesc { dof: Arc::new(ball), q, v, colliders: Vec::new() };
+    let id = world.add_figure_with_hulls(desc, vec![EmbeddedHull::new(vec![middle], REACH, 0.5)]).unwrap();
+    (0..12).for_each(|_| drop(world.step().clone()));
+    let frame = world.frame(id, middle).unwrap();
+    let (speed, spin) = (DVec3::from(frame.linear).x, DVec3::from(frame.angular).z);
+    // It slid for a quarter of a second; with nothing to turn it, it would slide for 0.8 s and stop.
+    assert!(speed > 2.0 && speed < 3.2, "{speed} m/s");
+    assert!((speed + REACH * spin).abs() < 0.02, "{speed} m/s, {spin} rad/s");
+}
+
 #[test]
 fn bad_hulls_are_refused_by_name() {
     let body = jelly(1e5, [1, 1, 1]);
