@@ -30,6 +30,8 @@ pub(crate) struct SecondPoint {
     pub arms: [DVec3; 2],
     /// What the gap is at the start of the tick if it is linear about the candidate, m.
     pub start_gap: f64,
+    /// How deep the pair was already when the tick began, m.
+    pub start_depth: f64,
 }
 
 /// Where the solver wants to put the bodies of a tick.
@@ -137,6 +139,7 @@ impl Look<'_> {
         if found.iter().all(|point| point.gap >= believed - DEEPER) {
             return;
         }
+        let start_depth = -points().map(|contact| contact.gap).fold(0.0, f64::min);
         let surface = materials.contact(a.collider.material(), b.collider.material());
         let partner_moves = matches!(partner, Partner::Body(_));
         for point in found {
@@ -147,7 +150,7 @@ impl Look<'_> {
             let arms = arms.map(|origin| point.position - origin);
             let moved = self.dt * (b.carrier.at(arms[1]) - a.carrier.at(arms[0]));
             let contact = ContactPoint::fresh(key, normal, point, surface);
-            self.second.push(SecondPoint { contact, arms, start_gap: point.gap - moved.dot(normal) });
+            self.second.push(SecondPoint { contact, arms, start_gap: point.gap - moved.dot(normal), start_depth });
         }
     }
 }

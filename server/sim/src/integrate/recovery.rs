@@ -41,7 +41,8 @@ impl Solve {
     /// Prepares the second solution, which goes on from where the first one ended. Answers whether one is wanted.
     fn start_over_without_recovery(&mut self, scene: &Scene) -> bool {
         let contacts = &mut self.problem.terms.contacts;
-        let is_deep = contacts.iter().any(|contact| contact.recovers());
+        // Those after the first look's deepened in this tick, at speeds that bodies have.
+        let is_deep = contacts.iter().take(self.contacts.len()).any(|contact| contact.recovers());
         if is_deep {
             contacts.iter_mut().for_each(|contact| contact.stop_recovery());
             self.is_pending = true;

@@ -205,24 +205,26 @@ impl ContactTerm {
         }
     }
 
-    /// A point of the second look. What the tick itself has made of the gap is taken back at any speed.
+    /// A point of the second look. What the tick itself has made of the gap is taken back at any speed; what was there when
+    /// it began is left to recovery.
     pub fn second(
         frames: [FrameIndex; 2],
-        SecondPoint { contact: point, start_gap, .. }: &SecondPoint,
+        SecondPoint { contact: point, start_gap, start_depth, .. }: &SecondPoint,
         arms: [DVec3; 2],
         mass: f64,
         settings: &ContactSettings,
         dt: f64,
     ) -> Self {
         let unit = mass / (dt * dt);
-        let stiffness = settings.normal_stiffness.max((-point.gap / settings.transition).min(STIFFEST));
+        let deepened = -point.gap - start_depth;
+        let stiffness = settings.normal_stiffness.max((deepened / settings.transition).min(STIFFEST));
         Self {
             frames,
             arms,
             normal: point.normal,
-            start_gap: *start_gap,
-            excess_depth: 0.0,
-            loaded_gap: *start_gap,
+            start_gap: start_gap + start_depth,
+            excess_depth: *start_depth,
+            loaded_gap: (start_gap + start_depth).max(0.0),
             stiffening: 1.0,
             most_stiffening: 1.0,
             tolerance: settings.gap_tolerance,
@@ -301,7 +303,7 @@ impl ContactTerm {
         self.depth(self.displacement(dt, at)) + self.excess_depth
     }
 
-    /// Whether it takes back a depth that its load does not explain.
+    /// Whether it takes back a depth that its load does not explain. What [`ContactTerm::second`] takes back is the tick's.
     pub fn recovers(&self) -> bool {
         self.loaded_gap - self.start_gap > RECOVERY_SLOP
     }
