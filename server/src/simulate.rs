@@ -66,12 +66,15 @@ impl Subject {
             let settings = ArenaSettings { tick_hz, threads: usize::from(args.threads) };
             let given = args.parameters.iter().cloned().collect();
             let text = ArenaText::find(&args.scene.to_string_lossy(), &given)?;
-            return Ok(Self::Arena(Box::new(text.build(&settings)?)));
+            let mut arena = Box::new(text.build(&settings)?);
+            arena.audit_energy();
+            return Ok(Self::Arena(arena));
         }
         let file = args.scene.display().to_string();
         let text = std::fs::read_to_string(&args.scene)
             .map_err(|reason| SimulateError::Unreadable { file: file.clone(), reason })?;
-        let settings = Settings { threads: usize::from(args.threads), ..Settings::at(1.0 / f64::from(tick_hz)) };
+        let (threads, dt) = (usize::from(args.threads), 1.0 / f64::from(tick_hz));
+        let settings = Settings { threads, audit_energy: true, ..Settings::at(dt) };
         match Scene::parse(&text, &settings) {
             Ok(scene) => Ok(Self::Scene(Box::new(scene))),
             Err(reason) => Err(SimulateError::Scene { file, reason }),
@@ -168,6 +171,9 @@ struct Summary {
     fastest: f64,
     /// Most kinetic energy at the end of any tick, J.
     liveliest: f64,
+    /// Ticks in which energy came from nowhere, and the most that came in one, J.
+    bursts: usize,
+    worst_gain: f64,
     /// Sporadic jobs of all ticks.
     sporadic: usize,
     /// Actors that were put back, or taken away, because they left the bounds or were quarantined.
@@ -188,6 +194,8 @@ impl Summary {
             dof: 0,
             fastest: 0.0,
             liveliest: 0.0,
+            bursts: 0,
+            worst_gain: 0.0,
             sporadic: 0,
             lost: 0,
             state_hash: 0,
@@ -206,13 +214,15 @@ impl Summary {
         self.total.worst_joint_gap = self.total.worst_joint_gap.max(tick.worst_joint_gap);
         self.total.residual = self.total.residual.max(tick.residual);
         self.dof = self.dof.max(tick.dof);
+        self.liveliest = self.liveliest.max(tick.kinetic_energy);
+        self.bursts += usize::from(tick.is_energy_burst());
+        self.worst_gain = self.worst_gain.max(tick.energy_gain);
     }
 
     fn watch(&mut self, subject: &Subject) {
         let (world, logic) = (subject.world(), subject.logic());
         let speeds = world.bodies().iter().filter_map(|&id| world.velocity(id)).map(|velocity| velocity.length());
         self.fastest = speeds.fold(self.fastest, f64::max);
-        self.liveliest = self.liveliest.max(world.energy().kinetic);
         self.sporadic += logic.sporadic;
         self.lost += logic.lost;
     }
@@ -261,6 +271,8 @@ impl Summary {
             "quarantined": self.total.quarantined,
             "fastest_m_per_s": self.fastest,
             "kinetic_energy_max_J": self.liveliest,
+            "energy_bursts": self.bursts,
+            "worst_energy_gain_J": self.worst_gain,
             "lost_actors": self.lost,
             "sporadic_jobs_per_tick": self.mean(self.sporadic),
             // A 64-bit hash does not survive readers that know numbers only as f64.
@@ -302,6 +314,7 @@ impl Summary {
             ("unconverged islands", self.total.unconverged_islands.to_string()),
             ("quarantined bodies", self.total.quarantined.to_string()),
             ("fastest body, most energy of motion", format!("{:.1} m/s, {:.3e} J", self.fastest, self.liveliest)),
+            ("energy bursts, most gained in a tick", format!("{}, {:.3e} J", self.bursts, self.worst_gain)),
             ("actors lost", self.lost.to_string()),
             ("sporadic jobs a tick", format!("{:.2}", self.mean(self.sporadic))),
             ("state hash", format!("{:016x}", self.state_hash)),

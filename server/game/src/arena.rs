@@ -248,6 +248,12 @@ impl Arena {
         &self.logic
     }
 
+    /// From the next tick on, the engine says how much energy came from nowhere: see
+    /// [`StepReport::energy_gain`](pita_sim::StepReport::energy_gain).
+    pub fn audit_energy(&mut self) {
+        self.world.audit_energy();
+    }
+
     /// Stage 1: takes the commands that came in since the last tick and applies them.
     pub(crate) fn collect_input(&mut self, ports: &mut impl Ports) {
         self.events.clear();

@@ -21,6 +21,9 @@ pub struct Settings {
     pub contact: ContactSettings,
     /// When islands fall asleep; `None` keeps everything awake.
     pub sleep: Option<SleepSettings>,
+    /// Whether each tick says how much energy came from nowhere, [`StepReport::energy_gain`](crate::StepReport::energy_gain):
+    /// for shows and tests; it changes nothing of the motion.
+    pub audit_energy: bool,
 }
 
 /// When an island falls asleep: no part of it was faster than this for a while, nor became faster or slower. What sleeps
@@ -93,6 +96,7 @@ impl Settings {
             solver: SolverSettings::default(),
             contact: ContactSettings::default(),
             sleep: Some(SleepSettings::default()),
+            audit_energy: false,
         }
     }
 

@@ -19,12 +19,14 @@ const FASTEST: f64 = 60.0;
 /// Runs an arena for `seconds` and answers its state hash.
 fn run(name: &str, text: &str, seconds: usize, settings: &ArenaSettings) -> u64 {
     let mut arena = Arena::from_toml(text, settings).unwrap_or_else(|error| panic!("{name}: {error}"));
+    arena.audit_energy();
     let mut ports = Recorder::default();
     for tick in 0..seconds * usize::from(settings.tick_hz) {
         pipeline::tick(&mut arena, &mut ports);
         ports = Recorder::default();
         let world = arena.world();
         assert_eq!(world.report().quarantined, 0, "{name}, tick {tick}");
+        assert!(!world.report().is_energy_burst(), "{name}, tick {tick}: {:?}", world.report());
         for actor in arena.actors() {
             let bodies = arena.actor(actor.id).expect("listed above").bodies();
             let fastest =

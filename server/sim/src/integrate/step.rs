@@ -180,6 +180,9 @@ impl Integrator {
         }
         for solve in &self.solves[..self.islands.len()] {
             solve.write_back(scene, &mut report);
+            if scene.settings.audit_energy {
+                report.work_put_in += solve.problem.work_put_in();
+            }
         }
         report
     }
@@ -206,6 +209,9 @@ fn land(
                     (&free, free.target)
                 }
             };
+            if settings.audit_energy {
+                report.work_put_in += settings.dt * (body.force.dot(twist.linear) + body.torque.dot(twist.angular));
+            }
             body.advance(node, twist, settings.dt, state);
             body.remember_impulse(node, twist);
             report.dof += if node.rotates { 6 } else { 3 };
@@ -214,8 +220,12 @@ fn land(
                 report.quarantined += 1;
             }
         }
-        (Some(_), Some(solve)) => {
+        (Some(own), Some(solve)) => {
             let figure = &solve.problem.figures.list()[active.figure as usize];
+            if settings.audit_energy {
+                let power: f64 = own.force.iter().zip(&figure.v1).map(|(force, rate)| force * rate).sum();
+                report.work_put_in += settings.dt * power;
+            }
             body.advance_figure(&figure.q1, &figure.v1, state);
             report.dof += figure.v1.len();
             if !body.is_sane(state) {

@@ -53,6 +53,11 @@ impl World {
         energy
     }
 
+    /// From the next tick on, reports say how much energy came from nowhere: see [`crate::Settings::audit_energy`].
+    pub fn audit_energy(&mut self) {
+        self.settings.audit_energy = true;
+    }
+
     /// Momentum now.
     pub fn momentum(&self) -> Momentum {
         let mut momentum = Momentum::default();

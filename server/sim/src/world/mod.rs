@@ -101,6 +101,7 @@ impl World {
 
     /// Stage 4: integrates all DOF over one tick.
     pub fn integrate(&mut self) -> &StepReport {
+        let before = self.settings.audit_energy.then(|| self.energy().total());
         self.detector.second.clear();
         let (integrator, mut scene) = self.scene();
         integrator.begin(&mut scene);
@@ -128,6 +129,11 @@ impl World {
         self.report.pairs = self.detector.pairs();
         self.settle();
         self.report.asleep = self.sleepers.count;
+        if let Some(before) = before {
+            let after = self.energy();
+            self.report.kinetic_energy = after.kinetic;
+            self.report.energy_gain = after.total() - before - self.report.work_put_in;
+        }
         &self.report
     }
 

@@ -12,6 +12,7 @@ mod couplings;
 mod determinism;
 mod elasticity;
 mod embedded_hulls;
+mod energy_audit;
 mod fast_things;
 mod figures;
 mod fine_phase;

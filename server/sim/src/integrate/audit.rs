@@ -1,0 +1,29 @@
+//! The audit of a tick's energy: what bodies were given by those who may give.
+//!
+//! Owns the work of potentials that put energy in: motors, axles with their springs, anti-roll bars and controllers.
+//! Contacts, joints and limits may only take; what springs and elastic bodies hold is part of the world's energy.
+
+use super::problem::{Problem, Terms};
+use crate::potential::{Term, Wrench};
+
+impl Problem {
+    /// Work that potentials put into the island in the tick that is solved, J.
+    pub(super) fn work_put_in(&self) -> f64 {
+        let Terms { motors, axles, anti_roll_bars, pds, .. } = &self.terms;
+        self.work_of(motors) + self.work_of(axles) + self.work_of(anti_roll_bars) + self.work_of(pds)
+    }
+
+    /// Forces at the end of the tick times the ways that they went.
+    fn work_of(&self, terms: &[impl Term]) -> f64 {
+        let work = |term| {
+            let frames = self.pair(term);
+            let (_, gradients) = Term::evaluate(term, self.dt, frames);
+            let powers = frames
+                .iter()
+                .zip(&gradients)
+                .map(|(frame, Wrench { force, torque })| force.dot(frame.linear) + torque.dot(frame.angular));
+            -self.dt * powers.sum::<f64>()
+        };
+        terms.iter().map(work).sum()
+    }
+}
