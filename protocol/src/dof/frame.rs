@@ -186,18 +186,29 @@ impl Frame {
         merged
     }
 
-    /// Hash of all that the receiver has, folded to 16 bits: a desync is noticed at once.
+    /// Sum of hashes of all that the receiver has, folded to 16 bits: a desync is noticed at once.
     pub fn check(&self) -> u16 {
-        let mut hash = 0u32;
-        let mut add = |x: u32| hash = (hash.rotate_left(5) ^ x).wrapping_mul(0x9E37_79B9);
-        for (body, tick) in self.bodies() {
-            add(body.id);
-            add(tick as u32);
-            for group in self.groups(body) {
-                add(group.value.largest.into());
-                group.value.steps.iter().for_each(|&s| add(s as u32));
-            }
+        let mut sum = 0u64;
+        for (index, group) in self.groups.iter().enumerate() {
+            let Quantised { largest, steps: [a, b, c], .. } = group.value;
+            sum = sum.wrapping_add(mixed([index as u32, largest.into(), a as u32, b as u32, c as u32]));
         }
-        (hash ^ hash >> 16) as u16
+        for (body, tick) in self.bodies() {
+            sum = sum.wrapping_add(mixed([body.id, tick as u32, body.start, 0, 0]));
+        }
+        (sum >> 48) as u16
     }
+}
+
+/// A hash of five numbers: its parts do not wait for each other.
+fn mixed(numbers: [u32; 5]) -> u64 {
+    const FACTORS: [u64; 5] = [
+        0x9E37_79B9_7F4A_7C15,
+        0xBF58_476D_1CE4_E5B9,
+        0x94D0_49BB_1331_11EB,
+        0xD6E8_FEB8_6659_FD93,
+        0xA076_1D64_78BD_642F,
+    ];
+    let sum = numbers.iter().zip(FACTORS).fold(0u64, |sum, (&x, by)| sum.wrapping_add(u64::from(x).wrapping_mul(by)));
+    (sum ^ sum >> 32).wrapping_mul(FACTORS[1])
 }

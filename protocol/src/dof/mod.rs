@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  State ── quantise ──▶ steps ──┐
-//!                                ├─ walk ── residual ── model ── range_coder ──▶ bytes
+//!                                ├─ walk ── residual ── model ── ans ──▶ bytes
 //!  Frame (baseline) ── predict ──┘             the same walk reads ◀─────────────┘
 //! ```
 //!
@@ -13,6 +13,7 @@
 //!
 //! Kinds of bodies, by [`Body::kind`], are the [`kind`]s below. Whatever the kind, a body is a row of [`Group`]s.
 
+mod ans;
 mod budget;
 mod cells;
 mod frame;
@@ -23,7 +24,6 @@ mod predict;
 mod priority;
 mod quantise;
 mod quaternion;
-mod range_coder;
 mod residual;
 mod slice;
 mod stream;

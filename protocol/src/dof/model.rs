@@ -1,17 +1,18 @@
-//! Adaptive models: what probability the next bit has.
+//! Adaptive models: what probability the next choice has.
 //!
-//! A [`Bit`] counts one context. A [`Mixer`] joins the opinions of several in the logistic domain, after Matt Mahoney's
-//! lpaq, with weights that learn. All arithmetic is on integers, so both sides agree to the last bit.
+//! A [`Bit`] counts one context of yes and no, [`Symbols`] one of a small alphabet, as bounds that move towards what was
+//! seen. All arithmetic is on integers, of [`Symbols`] as many side by side as a processor has lanes, and both sides agree
+//! to the last bit.
 
-use super::range_coder::{Coder, Probability};
+use super::ans::{Coder, WHOLE};
 
-/// How fast a fresh model learns: the step of the n-th observation, of 2^16.
+/// How fast a fresh bit learns: the step of the n-th observation, of 2^16.
 const STEP: [u16; 16] =
     [32768, 21845, 16384, 13107, 10923, 9362, 8192, 7282, 6554, 5958, 5461, 5041, 4681, 4369, 4096, 3277];
-/// Probabilities stay this far from 0 and 1, of 2^16.
+/// Probabilities of a bit stay this far from 0 and 1, of 2^16.
 const EDGE: i32 = 24;
 
-/// The probability of a 1 in one context.
+/// The probability of a 1 in one context, of 2^16.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bit {
     p: u16,
@@ -22,82 +23,69 @@ impl Bit {
     /// Knows nothing yet.
     pub const NEW: Self = Self { p: 1 << 15, seen: 0 };
 
-    fn learn(&mut self, bit: bool, limit: u8) {
-        let target = if bit { 65536 - EDGE } else { EDGE };
-        let step = i32::from(STEP[usize::from(self.seen)]);
-        // The product takes 32 bits: the difference has 17 and the step 16.
-        let learnt = (i64::from(target - i32::from(self.p)) * i64::from(step)) >> 16;
-        self.p = (i32::from(self.p) + learnt as i32) as u16;
-        self.seen = (self.seen + 1).min(limit);
-    }
-
-    /// Codes a bit by this context alone.
+    /// Codes a bit in this context.
     pub fn code(&mut self, coder: &mut impl Coder, bit: bool) -> bool {
-        let bit = coder.bit(bit, self.p);
-        self.learn(bit, STEP.len() as u8 - 1);
+        let bit = coder.bit(bit, u32::from(self.p >> 1).max(1));
+        let target = if bit { 65536 - EDGE } else { EDGE };
+        // The product takes 33 bits: the difference has 17 and the step 16.
+        let learnt = (i64::from(target - i32::from(self.p)) * i64::from(STEP[usize::from(self.seen)])) >> 16;
+        self.p = (i32::from(self.p) + learnt as i32) as u16;
+        self.seen = (self.seen + 1).min(STEP.len() as u8 - 1);
         bit
     }
 }
 
-/// Opinions that a mixer joins.
-pub const INPUTS: usize = 3;
-
-/// Weights of [`INPUTS`] opinions, of 2^16.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Mixer {
-    weights: [i32; INPUTS],
+/// Probabilities of `N` symbols in each of `K` contexts: where each symbol ends, of 2^15. The last one ends with the whole,
+/// for which the largest number of 16 bits stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[repr(align(64))]
+pub struct Symbols<const N: usize, const K: usize> {
+    bounds: [[i16; N]; K],
+    /// How often each context was used, as far as that matters.
+    seen: [u8; K],
 }
 
-impl Mixer {
-    /// All opinions count alike, and a little more than an average.
-    pub const NEW: Self = Self { weights: [26_000; INPUTS] };
+/// What no symbol's probability falls below but for rounding, of 2^15.
+const FLOOR: usize = 1;
+/// How slowly a context learns that was used so often: it takes over 2^-n of what it sees.
+const SLOWNESS: [u8; 32] =
+    [1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 6];
 
-    /// Codes a bit by the joined opinion of `opinions`, which are indices of `bits`, and lets all learn.
+impl<const N: usize, const K: usize> Symbols<N, K> {
+    /// All symbols alike.
+    pub const NEW: Self = {
+        let mut bounds = [i16::MAX; N];
+        let mut i = 0;
+        while i < N - 1 {
+            bounds[i] = (WHOLE as usize * (i + 1) / N) as i16;
+            i += 1;
+        }
+        Self { bounds: [bounds; K], seen: [0; K] }
+    };
+
+    /// Where the bounds go when a symbol is seen, by symbol.
+    const TARGETS: [[i16; N]; N] = {
+        let mut targets = [[i16::MAX; N]; N];
+        let mut at = 0;
+        while at < N * (N - 1) {
+            let (symbol, i) = (at / (N - 1), at % (N - 1));
+            let bound = if i < symbol { FLOOR * (i + 1) } else { WHOLE as usize - FLOOR * (N - 1 - i) };
+            targets[symbol][i] = bound as i16;
+            at += 1;
+        }
+        targets
+    };
+
+    /// Codes a symbol in a context.
     #[inline]
-    pub fn code(&mut self, coder: &mut impl Coder, bits: &mut [Bit], opinions: [usize; INPUTS], bit: bool) -> bool {
-        let stretched = opinions.map(|at| stretch(bits[at].p));
-        let dot: i64 = (0..INPUTS).map(|i| i64::from(self.weights[i]) * i64::from(stretched[i])).sum();
-        let p = squash((dot >> 16).clamp(-2047, 2047) as i32);
-        let bit = coder.bit(bit, (p << 4) as Probability);
-        let error = ((i32::from(bit) << 12) - p) * RATE;
-        for (weight, st) in self.weights.iter_mut().zip(stretched) {
-            *weight = (*weight + ((st * error + (1 << 9)) >> 10)).clamp(-(1 << 20), 1 << 20);
+    pub fn code(&mut self, coder: &mut impl Coder, context: usize, symbol: usize) -> usize {
+        let (bounds, seen) = (&mut self.bounds[context], &mut self.seen[context]);
+        let symbol = coder.symbol(symbol, bounds);
+        let slowness = SLOWNESS[usize::from(*seen)] & 15;
+        for (bound, target) in bounds.iter_mut().zip(&Self::TARGETS[symbol]) {
+            *bound += (target - *bound) >> slowness;
         }
-        opinions.into_iter().for_each(|at| bits[at].learn(bit, STEP.len() as u8 - 1));
-        bit
+        *seen = (*seen + 1).min(SLOWNESS.len() as u8 - 1);
+        symbol
     }
-}
-
-/// How fast weights learn.
-const RATE: i32 = 6;
-
-/// 4096 / (1 + e^(−x/256)) for x = −2048, −1920, ..., 2048, within 1 to 4095.
-const SQUASH: [i32; 33] = [
-    1, 2, 3, 6, 10, 16, 27, 45, 73, 120, 194, 310, 488, 747, 1101, 1546, 2047, 2549, 2994, 3348, 3607, 3785, 3901,
-    3975, 4022, 4050, 4068, 4079, 4085, 4089, 4092, 4093, 4094,
-];
-
-/// From the logistic domain, −2047 to 2047, to a probability of 4096.
-const fn squash(x: i32) -> i32 {
-    let (at, part) = (((x >> 7) + 16) as usize, x & 127);
-    (SQUASH[at] * (128 - part) + SQUASH[at + 1] * part + 64) >> 7
-}
-
-/// The inverse of [`squash`]: the least x whose probability is not below.
-static STRETCH: [i16; 4096] = {
-    let mut table = [2047i16; 4096];
-    let (mut x, mut p) = (-2047, 0);
-    while x <= 2047 {
-        let up_to = squash(x);
-        while p <= up_to {
-            table[p as usize] = x as i16;
-            p += 1;
-        }
-        x += 1;
-    }
-    table
-};
-
-fn stretch(p: u16) -> i32 {
-    i32::from(STRETCH[usize::from(p >> 4)])
 }

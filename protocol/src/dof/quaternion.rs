@@ -1,4 +1,4 @@
-//! Unit quaternions and rotation vectors in integers: the same bits on every machine.
+//! Quaternions of rotations in integers: the same bits on every machine.
 //!
 //! Components are of 2^30 (`ONE`). Products are exact in 64 bits and rounded down to 2^30 once.
 
@@ -11,6 +11,9 @@ const BITS: u32 = 30;
 pub struct Quaternion(pub [i64; 4]);
 
 impl Quaternion {
+    /// No rotation.
+    pub const NONE: Self = Self([0, 0, 0, ONE]);
+
     /// The rotation backwards.
     pub fn conjugate(self) -> Self {
         let [x, y, z, w] = self.0;
@@ -35,51 +38,46 @@ impl Quaternion {
         Self([tx, ty, tz, (w * w - x * x - y * y - z * z) >> BITS])
     }
 
-    /// The rotation by the rotation vector `v`, rad of 2^24, each component at most 2^31 in size.
-    pub fn exp(v: [i64; 3]) -> Self {
-        // Half the angle, of 2^30: the vector part's direction.
-        let mut h = v.map(|x| x << 5);
-        let mut squarings = 0;
-        // Below a quarter of a radian these terms suffice; it is at most 2^36, which takes eight halvings.
-        while h.iter().any(|x| x.abs() > ONE >> 2) {
-            h = h.map(|x| x >> 1);
-            squarings += 1;
+    /// The rotation `n` times.
+    pub fn power(self, n: u32) -> Self {
+        let mut power = if n & 1 == 1 { self } else { Self::NONE };
+        let (mut left, mut doubled) = (n >> 1, self);
+        while left > 0 {
+            doubled = doubled.squared();
+            if left & 1 == 1 {
+                power = doubled.times(power);
+            }
+            left >>= 1;
         }
-        let square = h.iter().map(|x| x * x).sum::<i64>() >> BITS;
-        let fourth = (square * square) >> BITS;
-        let sixth = (fourth * square) >> BITS;
-        let sine = ONE - square / 6 + fourth / 120 - sixth / 5040;
-        let cosine = ONE - square / 2 + fourth / 24 - sixth / 720;
-        let [x, y, z] = h.map(|x| (x * sine) >> BITS);
-        (0..squarings).fold(Self([x, y, z, cosine]), |q, _| q.squared())
+        power
     }
 
-    /// The rotation vector, rad of 2^24, of at most half a turn.
-    pub fn log(self) -> [i64; 3] {
-        let [mut x, mut y, mut z, mut w] = self.0;
-        if w < 0 {
-            [x, y, z, w] = [-x, -y, -z, -w];
-        }
-        // Halves the angle until its sine is below 1/4: the square root is (q + 1) normalised.
-        let mut doublings = 0;
-        while x * x + y * y + z * z > (ONE * ONE) >> 4 {
-            let length = isqrt(2 * ONE * (ONE + w)).max(1);
-            [x, y, z] = [x, y, z].map(|c| (c << BITS) / length);
-            w = ((ONE + w) << BITS) / length;
-            doublings += 1;
-        }
-        // asin(s) / s = 1 + s²/6 + 3 s⁴/40 + ...
-        let square = (x * x + y * y + z * z) >> BITS;
-        let fourth = (square * square) >> BITS;
-        let factor = ONE + square / 6 + fourth * 3 / 40 + ((fourth * square) >> BITS) * 5 / 112;
-        // Twice the half angle, from 2^30 to 2^24.
-        [x, y, z].map(|c| ((c * factor) >> BITS) << doublings >> 5)
+    /// The same rotation with w ≥ 0.
+    pub fn upright(self) -> Self {
+        if self.0[3] < 0 { Self(self.0.map(|c| -c)) } else { self }
+    }
+
+    /// Nearly the rotation by the rotation vector twice `half`, rad of 2^30, at most half a radian in each component.
+    pub fn small(half: [i64; 3]) -> Self {
+        let [x, y, z] = half.map(|x| x.clamp(-ONE / 2, ONE / 2));
+        Self([x, y, z, ONE - ((x * x + y * y + z * z) >> (BITS + 1))])
+    }
+
+    /// Nearer to length 1, which it is not far from.
+    pub fn normalised(self) -> Self {
+        let square = self.0.iter().map(|c| c * c).sum::<i64>() >> BITS;
+        let factor = (3 * ONE - square) >> 1;
+        Self(self.0.map(|c| (c * factor) >> BITS))
     }
 }
 
-/// The integer part of the square root; 0 for what is negative.
+/// The integer part of the square root; 0 for what is negative. At most 2^62.
 pub fn isqrt(x: i64) -> i64 {
-    x.max(0).isqrt()
+    let x = x.max(0);
+    // Within 1 of it, by whatever floating point; what follows is exact.
+    let root = (x as f64).sqrt() as i64;
+    let root = root - i64::from(root * root > x);
+    root + i64::from((root + 1) * (root + 1) <= x)
 }
 
 #[cfg(test)]
@@ -87,37 +85,65 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn float(q: Quaternion) -> [f64; 4] {
-        q.0.map(|x| x as f64 / ONE as f64)
+    /// The rotation by the rotation vector `v`, rad.
+    fn rotation(v: [f64; 3]) -> Quaternion {
+        let angle = v.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9);
+        let (sine, cosine) = (0.5 * angle).sin_cos();
+        let [x, y, z] = v.map(|x| x / angle * sine);
+        Quaternion([x, y, z, cosine].map(|c| (c * ONE as f64).round() as i64))
+    }
+
+    fn apart(a: Quaternion, b: Quaternion) -> i64 {
+        a.0.iter().zip(b.0).map(|(a, b)| (a - b).abs()).max().unwrap_or(0)
     }
 
     proptest! {
         #[test]
-        fn exp_is_the_exponential(v in prop::array::uniform3(-4.0f64..4.0)) {
-            let angle = v.iter().map(|x| x * x).sum::<f64>().sqrt();
-            let (s, c) = (0.5 * angle).sin_cos();
-            let q = float(Quaternion::exp(v.map(|x| (x * f64::from(1 << 24)) as i64)));
-            for i in 0..3 {
-                prop_assert!((q[i] - v[i] / angle * s).abs() < 1e-6, "{v:?} {q:?}");
-            }
-            prop_assert!((q[3] - c).abs() < 1e-6);
+        fn powers_are_repeated_products(v in prop::array::uniform3(-2.0f64..2.0), n in 0u32..=128) {
+            let q = rotation(v);
+            let product = (0..n).fold(Quaternion::NONE, |product, _| q.times(product));
+            prop_assert!(apart(product, q.power(n)) < 2000);
+            let turned = v.map(|x| x * f64::from(n));
+            let (power, whole) = (q.power(n).upright(), rotation(turned).upright());
+            prop_assert!(apart(power, whole).min(apart(power, Quaternion(whole.0.map(|c| -c)))) < 2000);
         }
 
         #[test]
-        fn log_undoes_exp(v in prop::array::uniform3(-1.7f64..1.7)) {
-            let fixed = v.map(|x| (x * f64::from(1 << 24)) as i64);
-            let back = Quaternion::exp(fixed).log();
-            for i in 0..3 {
-                prop_assert!((back[i] - fixed[i]).abs() < 200, "{fixed:?} {back:?}");
+        fn small_turns_are_rotations(v in prop::array::uniform3(-0.02f64..0.02)) {
+            let half = v.map(|x| (0.5 * x * ONE as f64) as i64);
+            prop_assert!(apart(Quaternion::small(half), rotation(v)) < 1000);
+            prop_assert_eq!(rotation(v).times(rotation(v).conjugate()).0.map(|c| (c + 8) >> 4), [0, 0, 0, ONE >> 4]);
+        }
+
+        /// What a track adds up is a rotation to within 2^-20 after any miss, and nothing overflows on the way.
+        #[test]
+        fn corrections_keep_the_length(v in prop::array::uniform3(-2.0f64..2.0), half in prop::array::uniform3(-ONE..ONE)) {
+            let mut turn = rotation(v);
+            for _ in 0..100 {
+                turn = Quaternion::small(half).times(turn).normalised();
+                prop_assert!(turn.0.iter().all(|c| c.abs() <= ONE + ONE / 8), "{turn:?}");
+                let _ = turn.power(127);
             }
+            for _ in 0..8 {
+                turn = turn.normalised();
+            }
+            let square: i64 = turn.0.iter().map(|c| c * c).sum::<i64>() >> BITS;
+            prop_assert!((square - ONE).abs() < ONE >> 20, "{square}");
         }
 
         #[test]
-        fn nothing_overflows(v in prop::array::uniform3(-(1i64 << 31)..1 << 31)) {
-            let q = Quaternion::exp(v);
-            let norm: i64 = q.0.iter().map(|x| (x * x) >> BITS).sum();
-            prop_assert!((norm - ONE).abs() < ONE >> 8, "{norm}");
-            let _ = q.log();
+        fn the_root_is_exact(x in 0i64..=1 << 62) {
+            prop_assert_eq!(isqrt(x), x.isqrt());
         }
+    }
+
+    #[test]
+    fn roots_next_to_squares_are_exact() {
+        for root in [0, 1, 2, 46_341, (1 << 30) - 1, 1 << 30, (1 << 31) - 1] {
+            for x in [root * root - 1, root * root, root * root + 1].into_iter().filter(|&x| x >= 0) {
+                assert_eq!(isqrt(x), x.isqrt(), "{x}");
+            }
+        }
+        assert_eq!(isqrt(-1), 0);
     }
 }

@@ -5,8 +5,8 @@
 //! │ flags │ base age   │ span      │ check   │ steps: 4 × u32 LE       │ coded bodies          │
 //! │ u8    │ u8, flag 0 │ u8, fl. 1 │ u16 LE  │ without flag 0 only     │ n bytes               │
 //! └───────┴────────────┴───────────┴─────────┴─────────────────────────┴───────────────────────┘
-//! flags: 1 has a baseline (base age ticks older), 2 has an earlier one (span ticks before the baseline), 4 partial,
-//!        8 the base is both of them together, each body as it was newer
+//! flags: 1 has a baseline (base age ticks older), 2 merged with an earlier one (span ticks before the baseline), each
+//!        body as it was newer, 4 partial
 //! ```
 //!
 //! An [`Encoder`] codes against nothing that was not acknowledged. So a lost, late or repeated snapshot harms no other.
@@ -14,11 +14,11 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
+use super::ans::{self, Coder};
 use super::budget::{Need, Spent};
 use super::frame::{Frame, State};
 use super::predict::GroupState;
 use super::quantise::{Precision, Quantised};
-use super::range_coder::{self, Coder};
 use super::walk::{Source, Walk};
 use crate::{WireError, codec::require};
 
@@ -33,9 +33,8 @@ pub const AGE_MAX: u64 = 255;
 pub const SNAPSHOT_MAX: usize = 1 << 20;
 
 const HAS_BASE: u8 = 1;
-const HAS_EARLIER: u8 = 2;
+const MERGED: u8 = 2;
 const PARTIAL: u8 = 4;
-const MERGED: u8 = 8;
 
 /// Writes a stream for one receiver, or one cell.
 #[derive(Debug, Default)]
@@ -45,6 +44,8 @@ pub struct Encoder {
     /// What the two newest that the receiver has come to, where one alone is not all that it has; with their ticks.
     merged: Option<((u64, u64), Frame)>,
     spent: Spent,
+    /// Memory for what is being coded.
+    choices: Vec<(u16, u16)>,
 }
 
 #[derive(Debug)]
@@ -86,10 +87,13 @@ impl Encoder {
     pub fn encode(&mut self, tick: u64, state: &State, chosen: &[bool]) -> Vec<u8> {
         assert!(self.sent.back().is_none_or(|last| last.frame.tick < tick), "ticks ascend");
         self.merge(tick);
-        let (base, earlier) = self.baselines(tick);
-        let merged = self.merged.as_ref().map(|(_, merged)| merged);
-        let against = Against { base, earlier, merged };
-        let (bytes, frame, spent) = encode_against(&against, tick, Source { state, chosen });
+        let mut choices = std::mem::take(&mut self.choices);
+        let against = match &self.merged {
+            Some(((_, earlier), merged)) => Some(Against { base: merged, earlier: Some(*earlier) }),
+            None => self.known(tick).next().map(|sent| Against { base: &sent.frame, earlier: None }),
+        };
+        let (bytes, frame, spent) = encode_against(against, tick, Source { state, chosen }, &mut choices);
+        self.choices = choices;
         self.spent = spent;
         let remembered = |sent: &VecDeque<Sent>| sent.iter().map(|sent| sent.frame.groups.len()).sum::<usize>();
         while self.sent.len() == HISTORY || (self.sent.len() > 1 && remembered(&self.sent) > REMEMBERED_MAX) {
@@ -105,14 +109,15 @@ impl Encoder {
     pub fn needs(&mut self, tick: u64, state: &State, into: &mut Vec<Need>) {
         into.clear();
         self.merge(tick);
-        let base = self.merged.as_ref().map(|(_, merged)| merged).or(self.baselines(tick).0);
+        let newest = self.known(tick).next().map(|sent| &sent.frame);
+        let base = self.merged.as_ref().map(|(_, merged)| merged).or(newest);
         let mut known = base.map_or(&[][..], |base| &base.bodies).iter().peekable();
         for body in state.bodies() {
             while known.next_if(|known| known.id < body.id).is_some() {}
             let had = known.peek().filter(|known| known.id == body.id).zip(base);
             into.push(match had {
                 Some((known, base)) if known.groups == body.groups && known.kind == body.kind => {
-                    need(base.groups(known), state.groups(body), state.precision())
+                    need(base.groups(known), state.groups(body))
                 }
                 _ => Need::First { groups: body.groups },
             });
@@ -122,12 +127,6 @@ impl Encoder {
     /// What the snapshot that was coded last took.
     pub fn spent(&self) -> &Spent {
         &self.spent
-    }
-
-    /// The newest frame that the receiver has, and the one before.
-    fn baselines(&self, tick: u64) -> (Option<&Frame>, Option<&Frame>) {
-        let mut known = self.known(tick).map(|sent| &sent.frame);
-        (known.next(), known.next())
     }
 
     /// Snapshots that the receiver has, newest first.
@@ -166,43 +165,41 @@ impl Encoder {
 }
 
 /// What a body whose groups a receiver has as `had` has to tell it.
-fn need(had: &[GroupState], now: &[Quantised], precision: &Precision) -> Need {
-    let changed = had.iter().zip(now).filter(|(had, now)| had.value != **now || !had.is_settled(precision)).count();
+fn need(had: &[GroupState], now: &[Quantised]) -> Need {
+    let changed = had.iter().zip(now).filter(|(had, now)| had.value != **now || !had.is_calm()).count();
     if changed == 0 { Need::Nothing } else { Need::Update { groups: changed as u16 } }
 }
 
 /// What a snapshot is coded against.
 struct Against<'a> {
-    /// The newest frame that the receiver has.
-    base: Option<&'a Frame>,
-    /// The one before.
-    earlier: Option<&'a Frame>,
-    /// Both together.
-    merged: Option<&'a Frame>,
+    /// The newest frame that the receiver has, with what the earlier one knows beyond it.
+    base: &'a Frame,
+    /// Tick of the earlier one, if there is one.
+    earlier: Option<u64>,
 }
 
 /// The snapshot of `tick` as bytes, the frame that a receiver has after it, and what bodies took of the bytes.
-fn encode_against(against: &Against<'_>, tick: u64, source: Source<'_>) -> (Vec<u8>, Frame, Spent) {
-    let Against { base, earlier, merged } = *against;
+fn encode_against(
+    against: Option<Against<'_>>,
+    tick: u64,
+    source: Source<'_>,
+    choices: &mut Vec<(u16, u16)>,
+) -> (Vec<u8>, Frame, Spent) {
     let partial = source.chosen.iter().any(|carried| !carried);
     let mut bytes = vec![u8::from(partial) * PARTIAL];
-    if let Some(base) = base {
+    if let Some(Against { base, earlier }) = &against {
         bytes[0] |= HAS_BASE;
         bytes.push((tick - base.tick) as u8);
-    }
-    let earlier = earlier.and_then(|earlier| Some((earlier, u8::try_from(base?.tick - earlier.tick).ok()?)));
-    if let Some((_, span)) = earlier {
-        bytes[0] |= HAS_EARLIER;
-        bytes.push(span);
-    }
-    if merged.is_some() {
-        bytes[0] |= MERGED;
+        if let Some(earlier) = earlier {
+            bytes[0] |= MERGED;
+            bytes.push((base.tick - earlier) as u8);
+        }
     }
     let check_at = bytes.len();
     bytes.extend([0; 2]);
     let empty;
-    let base = match merged.or(base) {
-        Some(base) => base,
+    let base = match against {
+        Some(Against { base, .. }) => base,
         None => {
             empty = Frame::empty(*source.state.precision());
             let p = empty.precision;
@@ -211,13 +208,12 @@ fn encode_against(against: &Against<'_>, tick: u64, source: Source<'_>) -> (Vec<
         }
     };
     let mut next = successor(base, tick);
-    let mut coder = range_coder::Encoder::new(&mut bytes);
-    let earlier = earlier.map(|(earlier, _)| earlier);
+    let mut coder = ans::Encoder::new(choices);
     let mut spent = Spent::default();
-    let walk = Walk { coder: &mut coder, base, earlier, partial, source: Some(source), spent: &mut spent };
+    let walk = Walk { coder: &mut coder, base, partial, source: Some(source), spent: &mut spent };
     // Every error of a walk is about something that a state cannot be.
     walk.run(&mut next).expect("a state that was checked when it was made");
-    coder.finish();
+    coder.finish(&mut bytes);
     bytes[check_at..check_at + 2].copy_from_slice(&next.check().to_le_bytes());
     (bytes, next, spent)
 }
@@ -251,27 +247,23 @@ impl Decoder {
         require(bytes.len() <= SNAPSHOT_MAX, "snapshot", "at most 1 MiB")?;
         let mut header = Header { bytes };
         let [flags] = header.take()?;
-        require(flags & !(HAS_BASE | HAS_EARLIER | PARTIAL | MERGED) == 0, "snapshot flags", "those that are known")?;
-        let empty;
-        let (mut base, mut earlier) = (None, None);
+        require(flags & !(HAS_BASE | MERGED | PARTIAL) == 0, "snapshot flags", "those that are known")?;
+        let (empty, merged);
+        let mut base = None;
         if flags & HAS_BASE != 0 {
             let [age] = header.take()?;
             require(age > 0, "age of the baseline", "1 to 255")?;
             base = Some(self.at(tick.checked_sub(age.into()))?);
         }
-        if flags & HAS_EARLIER != 0 {
+        if flags & MERGED != 0 {
             let [span] = header.take()?;
-            let base: &Frame = base.ok_or(WireError::Malformed)?;
+            let newest = base.ok_or(WireError::Malformed)?;
             require(span > 0, "span of the baselines", "1 to 255")?;
-            earlier = Some(self.at(base.tick.checked_sub(span.into()))?);
+            merged = newest.merged(self.at(newest.tick.checked_sub(span.into()))?, |_| true);
+            base = Some(&merged);
         }
-        let merged = match (flags & MERGED != 0, base.zip(earlier)) {
-            (true, Some((base, earlier))) => Some(base.merged(earlier, |_| true)),
-            (true, None) => return Err(WireError::Malformed),
-            (false, _) => None,
-        };
         let check = u16::from_le_bytes(header.take()?);
-        let base = match merged.as_ref().or(base) {
+        let base = match base {
             Some(base) => base,
             None => {
                 let mut steps = || Ok::<_, WireError>(u32::from_le_bytes(header.take()?));
@@ -282,11 +274,11 @@ impl Decoder {
             }
         };
         let mut next = successor(base, tick);
-        let mut coder = range_coder::Decoder::new(header.bytes);
+        let mut coder = ans::Decoder::new(header.bytes);
         let partial = flags & PARTIAL != 0;
         let spent = &mut Spent::default();
-        Walk { coder: &mut coder, base, earlier, partial, source: None, spent }.run(&mut next)?;
-        if coder.is_exhausted() || next.check() != check {
+        Walk { coder: &mut coder, base, partial, source: None, spent }.run(&mut next)?;
+        if !coder.is_finished() || next.check() != check {
             return Err(WireError::Desync);
         }
         let gone = if partial { gone(base, &next) } else { Vec::new() };

@@ -1,11 +1,11 @@
 //! One snapshot's coded part: the walk over all bodies that both sides make alike.
 
+use super::ans::Coder;
 use super::budget::Spent;
 use super::frame::{BODIES_MAX, BODY_GROUPS_MAX, Body, Frame, GROUPS_MAX, State};
 use super::predict::GroupState;
 use super::quantise::{Group, Precision, Quantised};
-use super::range_coder::Coder;
-use super::residual::{Models, Surroundings};
+use super::residual::Models;
 use crate::{WireError, codec::require};
 
 /// Uses of whole numbers.
@@ -47,8 +47,6 @@ pub struct Walk<'a, C> {
     pub coder: &'a mut C,
     /// What the snapshot is coded against.
     pub base: &'a Frame,
-    /// An older one that the receiver has too, for velocities.
-    pub earlier: Option<&'a Frame>,
     /// Whether bodies may be left out.
     pub partial: bool,
     /// What is coded; `None` when decoding.
@@ -70,7 +68,7 @@ impl<C: Coder> Walk<'_, C> {
             added = self.additions(&mut next.models, removed.len())?;
         }
         let (mut removed, mut added) = (removed.into_iter().peekable(), added.into_iter().peekable());
-        let mut neighbour = 0;
+        let (mut neighbour, mut cursor) = (0, 0);
         for index in 0..self.base.bodies.len() {
             if removed.next_if_eq(&index).is_some() {
                 continue;
@@ -80,7 +78,7 @@ impl<C: Coder> Walk<'_, C> {
                 self.first(next, body)?;
             }
             require(added.peek().is_none_or(|body| body.id != id), "added body", "not there yet")?;
-            self.body(next, index, &mut neighbour)?;
+            self.body(next, index, &mut neighbour, &mut cursor)?;
         }
         added.try_for_each(|body| self.first(next, body))
     }
@@ -132,7 +130,6 @@ impl<C: Coder> Walk<'_, C> {
                 None if same => return Err(WireError::Malformed),
                 _ => self.layout(body.map_or(0, |body| body.kind), &layout)?,
             };
-            require(!self.coder.is_exhausted(), "coded data", "longer")?;
             added.push(Added { id, kind, parent, layout });
         }
         Ok(added)
@@ -159,7 +156,6 @@ impl<C: Coder> Walk<'_, C> {
     /// A body that the receiver does not have yet.
     fn first(&mut self, next: &mut Frame, added: Added) -> Result<(), WireError> {
         require(next.groups.len() + added.layout.len() <= GROUPS_MAX, "groups", "at most 65536")?;
-        require(!self.coder.is_exhausted(), "coded data", "longer")?;
         let source = self.source.and_then(|s| Some(s.state.groups(s.state.find(added.id)?)));
         let (start, written) = (next.groups.len(), self.coder.written());
         // Points are likely to be near the last point of this body, the first one near the first of the body before.
@@ -179,13 +175,20 @@ impl<C: Coder> Walk<'_, C> {
         Ok(())
     }
 
-    /// A body of the base.
-    fn body(&mut self, next: &mut Frame, index: usize, neighbour: &mut u32) -> Result<(), WireError> {
+    /// A body of the base; `cursor` is where the source has the one before.
+    fn body(
+        &mut self,
+        next: &mut Frame,
+        index: usize,
+        neighbour: &mut u32,
+        cursor: &mut usize,
+    ) -> Result<(), WireError> {
         let body = self.base.bodies[index];
         let old = &self.base.groups[body.start as usize..][..body.groups.into()];
         let source = self.source.and_then(|s| {
-            let at = s.state.bodies().binary_search_by_key(&body.id, |body| body.id).ok()?;
-            Some((s.carries(at), s.state.groups(&s.state.bodies()[at])))
+            *cursor += s.state.bodies()[*cursor..].iter().take_while(|known| known.id < body.id).count();
+            let found = s.state.bodies().get(*cursor).filter(|found| found.id == body.id)?;
+            Some((s.carries(*cursor), s.state.groups(found)))
         });
         let sent = !self.partial || next.models.flag(self.coder, flag::SENT, source.is_some_and(|(sent, _)| sent));
         let start = next.groups.len() as u32;
@@ -195,24 +198,28 @@ impl<C: Coder> Walk<'_, C> {
             next.groups.extend_from_slice(old);
             return Ok(());
         }
-        require(!self.coder.is_exhausted(), "coded data", "longer")?;
-        let tick = self.base.ticks[index];
-        let ahead = next.tick.saturating_sub(tick) as i64;
-        let earlier = self.earlier.and_then(|earlier| earlier_of(earlier, index, &body, tick));
-        let mut around = Surroundings { sibling: None, neighbour: *neighbour };
+        next.ticks.push(next.tick);
+        if old.iter().all(GroupState::is_calm) {
+            let stirs = source.is_some_and(|(_, now)| old.iter().zip(now).any(|(base, now)| base.value != *now));
+            if !next.models.stirs(self.coder, *neighbour, stirs) {
+                next.groups.extend_from_slice(old);
+                *neighbour = 0;
+                return Ok(());
+            }
+        }
+        let ahead = next.tick.saturating_sub(self.base.ticks[index]) as i64;
+        let mut sibling = None;
         let (mut moved, mut changed, written) = (0, 0, self.coder.written());
         for (i, base) in old.iter().enumerate() {
-            let before = earlier.map(|(groups, span)| (&groups[i].value, span));
-            let prediction = base.predict(ahead, before, &next.precision);
+            let prediction = base.predict(ahead);
             let value = source.map(|(_, groups)| &groups[i]);
-            let (value, size) = next.models.group(self.coder, base, &prediction, &around, value, &next.precision)?;
+            let (value, size) = next.models.group(self.coder, base, &prediction, sibling, value, &next.precision)?;
             next.groups.push(prediction.update(base, value, &next.precision));
-            around.sibling = Some(size);
+            sibling = Some(size);
             moved += size;
             changed += usize::from(value != base.value);
         }
         self.spent.updates.add(changed, self.coder.written() - written);
-        next.ticks.push(next.tick);
         *neighbour = moved;
         Ok(())
     }
@@ -246,17 +253,6 @@ fn is_changed(base: &Frame, source: &Source) -> bool {
         return false;
     }
     base.bodies.iter().any(|body| !is_in(body, source.state)) || fresh(base, source).next().is_some()
-}
-
-/// The groups of `body` in `earlier`, where they are older than `tick`, and by how many ticks.
-fn earlier_of<'a>(earlier: &'a Frame, hint: usize, body: &Body, tick: u64) -> Option<(&'a [GroupState], i64)> {
-    let at = match earlier.bodies.get(hint) {
-        Some(same) if same.id == body.id => hint,
-        _ => earlier.bodies.binary_search_by_key(&body.id, |body| body.id).ok()?,
-    };
-    let (found, then) = (earlier.bodies[at], earlier.ticks[at]);
-    let span = tick.checked_sub(then).filter(|&span| span > 0)?;
-    (found.groups == body.groups).then(|| (earlier.groups(&earlier.bodies[at]), span as i64))
 }
 
 fn first_value(
