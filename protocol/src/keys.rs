@@ -6,6 +6,7 @@
 //! pita/<arena>/source             query: - -> ArenaSource
 //! pita/<arena>/status             query: - -> Status
 //! pita/<arena>/ticks              query: TicksRequest -> TickRecords
+//! pita/<arena>/admin              query: sealed AdminRequest -> AdminReply
 //! pita/<arena>/input/<slot>       put by the client: sealed InputPacket
 //! pita/<arena>/say/<slot>         query: sealed SayRequest -> SayReply
 //! pita/<arena>/snapshot/<slot>    put by the server: Snapshot
@@ -66,6 +67,12 @@ impl Keys {
     /// [`TickRecords`](crate::message::TickRecords).
     pub fn ticks(&self) -> String {
         self.of("ticks")
+    }
+
+    /// Query of who runs the server: a sealed [`AdminRequest`](crate::admin::AdminRequest) is answered by an
+    /// [`AdminReply`](crate::admin::AdminReply).
+    pub fn admin(&self) -> String {
+        self.of("admin")
     }
 
     /// Put by the client of `slot`: a sealed [`InputPacket`](crate::message::InputPacket).

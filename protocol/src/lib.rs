@@ -1,12 +1,13 @@
 //! PITA's wire: what travels between the daemon and its clients.
 //!
 //! Owns: key expressions ([`keys`]), messages ([`message`], those of inputs in [`input`], the world in words in [`description`],
-//! what players say in [`chat`]), their encoding and limits ([`codec`]), authentication of
+//! what players say in [`chat`], what those who run a server ask of it in [`admin`]), their encoding and limits ([`codec`]), authentication of
 //! inputs ([`seal`]), and the streams of DOF ([`dof`]). It does no I/O, reads no clock and knows no engine.
 //!
 //! Every byte that is decoded here is untrusted: decoding answers a [`WireError`], never panics, and allocates no more
 //! than the message's own limit.
 
+pub mod admin;
 pub mod build_info;
 pub mod chat;
 pub mod codec;

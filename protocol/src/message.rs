@@ -361,8 +361,27 @@ pub struct Status {
     pub input_wait_p99_ms: f64,
     /// What was refused, since the start.
     pub refused: RefusedCounts,
+    /// What actors do, by kind, in order of their names; at most [`KINDS_MAX`].
+    pub kinds: Vec<KindStatus>,
     /// Hash of the state after [`Status::tick`].
     pub state_hash: u64,
+}
+
+/// Most kinds of actors that a [`Status`] tells of.
+pub const KINDS_MAX: usize = 40;
+
+/// Longest name of a kind of actors there, bytes.
+const KIND_NAME_MAX: usize = 48;
+
+/// What the actors of one kind do.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct KindStatus {
+    /// `vehicle`, `crate`; at most 48 bytes.
+    pub kind: String,
+    /// How many acted in the last tick.
+    pub actors: u32,
+    /// Sporadic jobs of theirs since the start: work that is spread over ticks.
+    pub sporadic: u64,
 }
 
 /// Messages that were dropped or refused, by reason.
@@ -404,9 +423,10 @@ pub struct RefusedCounts {
 
 impl Message for Status {
     const KIND: u8 = 7;
-    const MAX_BYTES: usize = 2048;
+    const MAX_BYTES: usize = 4096;
     fn validate(&self) -> Result<(), WireError> {
-        Ok(())
+        require(self.kinds.len() <= KINDS_MAX, "kinds", "at most 40")?;
+        require(self.kinds.iter().all(|kind| kind.kind.len() <= KIND_NAME_MAX), "kind", "at most 48 bytes")
     }
 }
 
@@ -458,6 +478,10 @@ pub struct TickRecord {
     pub newton_iterations: u32,
     /// Iterations of the linear solver, summed over islands.
     pub linear_iterations: u32,
+    /// Actors that acted.
+    pub actors: u32,
+    /// Sporadic jobs that were due: work that is spread over ticks.
+    pub sporadic: u32,
 }
 
 /// Answer to a [`TicksRequest`].

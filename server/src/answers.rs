@@ -9,14 +9,17 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
 
+use pita_protocol::admin::{AdminReply, AdminRequest, CHALLENGE_BYTES};
 use pita_protocol::message::{
     Description, JoinAccepted, JoinReply, JoinRequest, Refusal, Role, SayRefusal, SayReply, SayRequest, TicksRequest,
 };
 use pita_protocol::seal::{self, SessionKey, TAG_BYTES};
 use pita_protocol::{Message, PROTOCOL_VERSION, WireError};
+use tokio::sync::mpsc::Sender as OrderSender;
 use zenoh::Wait;
 use zenoh::query::Query;
 
+use crate::admin::{Doorkeeper, Order, Verdict};
 use crate::metrics;
 use crate::sessions::{EndReason, JoinRefusal, Secrets, SessionId, Wish};
 use crate::shared::Shared;
@@ -39,6 +42,8 @@ pub enum Question {
     Status,
     /// What ticks cost.
     Ticks,
+    /// What only those may ask who run the server.
+    Admin,
 }
 
 /// What the answering thread does next.
@@ -93,15 +98,18 @@ pub struct Answering {
     queries: Arc<AtomicUsize>,
     /// Sessions that exist, but whose player is not in the arena yet.
     pending: HashMap<SessionId, (Query, SessionKey)>,
+    doorkeeper: Doorkeeper,
+    /// To the daemon's own loop.
+    orders: OrderSender<Order>,
 }
 
 impl Answering {
-    /// The thread's state and the way into its queue.
-    pub fn new(shared: Arc<Shared>) -> (Self, Asker) {
+    /// The thread's state and the way into its queue; what `doorkeeper` lets pass is sent to `orders`.
+    pub fn new(shared: Arc<Shared>, doorkeeper: Doorkeeper, orders: OrderSender<Order>) -> (Self, Asker) {
         let (sender, work) = mpsc::channel();
         let queries = Arc::new(AtomicUsize::new(0));
         let asker = Asker { shared: shared.clone(), work: sender, queries: queries.clone() };
-        (Self { shared, work, queries, pending: HashMap::new() }, asker)
+        (Self { shared, work, queries, pending: HashMap::new(), doorkeeper, orders }, asker)
     }
 
     /// Answers until [`Work::Stop`].
@@ -127,6 +135,7 @@ impl Answering {
         shared.counters.received_bytes.add(query.payload().map_or(0, |payload| payload.len()) as u64);
         match question {
             Question::Join => self.join(query),
+            Question::Admin => self.admin(query),
             Question::Say => self.say(&query),
             Question::Describe => reply(shared, &query, shared.keys.describe(), &*shared.description()),
             Question::Source => reply(shared, &query, shared.keys.source(), &*shared.source()),
@@ -152,6 +161,29 @@ impl Answering {
             }
             Err(refusal) => {
                 self.refuse(&query, refusal);
+            }
+        }
+    }
+
+    fn admin(&mut self, query: Query) {
+        let key_expr = self.shared.keys.admin();
+        let fits = query.payload().filter(|payload| payload.len() <= AdminRequest::MAX_BYTES + TAG_BYTES);
+        let sealed = fits.map(|payload| payload.to_bytes()).unwrap_or_default();
+        let verdict = match challenge() {
+            Ok(fresh) => self.doorkeeper.judge(&sealed, &key_expr, fresh),
+            Err(_) => Verdict::Answer(AdminReply::Refused),
+        };
+        match verdict {
+            Verdict::Answer(answer) => {
+                let refused = u64::from(answer == AdminReply::Refused);
+                self.shared.counters.query_malformed.add(refused);
+                reply(&self.shared, &query, key_expr, &answer);
+            }
+            Verdict::Do(action) => {
+                if let Err(full) = self.orders.try_send(Order { action, query }) {
+                    let busy = AdminReply::answered(false, ["the server is busy with others: ask again".to_owned()]);
+                    reply(&self.shared, &full.into_inner().query, key_expr, &busy);
+                }
             }
         }
     }
@@ -257,6 +289,14 @@ impl Answering {
         };
         self.refuse(&query, refusal);
     }
+}
+
+/// A challenge from the operating system.
+fn challenge() -> Result<[u8; CHALLENGE_BYTES], rand::rngs::SysError> {
+    use rand::TryRng;
+    let mut fresh = [0; CHALLENGE_BYTES];
+    rand::rngs::SysRng.try_fill_bytes(&mut fresh)?;
+    Ok(fresh)
 }
 
 /// Secrets from the operating system.

@@ -8,7 +8,7 @@ use pita_protocol::DEFAULT_ENDPOINT;
 use pita_protocol::build_info::VERSION_AND_COMMIT;
 
 use crate::config::TickRate;
-use crate::{check, daemon, simulate, status};
+use crate::{check, daemon, reload_command, simulate, status};
 
 /// Headless physics game server.
 #[derive(Debug, Parser)]
@@ -30,6 +30,8 @@ enum Command {
     Simulate(SimulateArgs),
     /// Ask a running server how it does
     Status(StatusArgs),
+    /// Ask a running server to read its arena's file again, as SIGHUP does
+    Reload(ReloadArgs),
 }
 
 /// Arguments of `run`. What is given here comes before the configuration.
@@ -99,6 +101,20 @@ pub struct StatusArgs {
     pub json: bool,
 }
 
+/// Arguments of `reload`.
+#[derive(Debug, Args)]
+pub struct ReloadArgs {
+    /// Endpoint of the server
+    #[arg(long, value_name = "ENDPOINT", default_value = DEFAULT_ENDPOINT)]
+    pub connect: String,
+    /// The file that the server's admin.secret_file names, or a copy of it
+    #[arg(long, value_name = "FILE")]
+    pub secret_file: PathBuf,
+    /// Print JSON instead of lines
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// `size=20`.
 fn parameter(text: &str) -> Result<(String, i64), String> {
     let parts = text.split_once('=').and_then(|(name, number)| Some((name.to_owned(), number.parse().ok()?)));
@@ -113,6 +129,7 @@ impl Cli {
             Command::Check(args) => check::run(&args),
             Command::Simulate(args) => simulate::run(&args),
             Command::Status(args) => status::run(&args),
+            Command::Reload(args) => reload_command::run(&args),
         }
     }
 }

@@ -35,6 +35,8 @@ pub struct ServerConfig {
     pub sessions: SessionLimits,
     /// Who stays out.
     pub bans: Bans,
+    /// Who runs the server.
+    pub admin: Admin,
     /// What is said on stdout.
     pub report: Report,
 }
@@ -134,6 +136,14 @@ pub struct SessionLimits {
 pub struct Bans {
     /// Names that are refused.
     pub names: Vec<String>,
+}
+
+/// `[admin]`
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Admin {
+    /// File of the secret under which admin requests are sealed; empty for none.
+    pub secret_file: PathBuf,
 }
 
 /// `[report]`

@@ -14,6 +14,7 @@ use pita_protocol::message::ArenaSource;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::oneshot;
 
+use crate::admin::{Doorkeeper, SecretError};
 use crate::arena_source::{ArenaText, SourceError};
 use crate::cli::RunArgs;
 use crate::config::{ConfigError, ServerConfig};
@@ -23,8 +24,8 @@ use crate::report::Troubles;
 use crate::sessions::{Limits, Sessions};
 use crate::shared::{Phase, Shared, Start};
 use crate::stopwatch::Clock;
-use crate::{description, metrics, report};
-use serve::Serving;
+use crate::{admin, description, metrics, report};
+use serve::{Happening, Serving};
 
 /// Threads of the runtime: signals, status lines and Zenoh's set-up; its traffic has threads of its own.
 const RUNTIME_THREADS: usize = 2;
@@ -52,6 +53,9 @@ pub enum DaemonError {
         /// What is allowed.
         reason: pita_protocol::WireError,
     },
+    /// Bad secret.
+    #[error(transparent)]
+    Secret(#[from] SecretError),
     /// It cannot listen.
     #[error(transparent)]
     Network(#[from] NetworkError),
@@ -112,7 +116,9 @@ fn configure(args: &RunArgs) -> Result<Configured, DaemonError> {
     let settings = reload::settings(&config);
     let text = ArenaText::find(&config.arena.source, &config.arena.parameters)?;
     let arena = text.build(&settings)?;
-    Ok(Configured { config, arena, source: text.text })
+    let secret_file = Some(&config.admin.secret_file).filter(|file| !file.as_os_str().is_empty());
+    let doorkeeper = Doorkeeper::new(secret_file.map(|file| admin::read_secret(file)).transpose()?);
+    Ok(Configured { config, arena, source: text.text, doorkeeper })
 }
 
 /// What is to run.
@@ -121,9 +127,11 @@ struct Configured {
     arena: Arena,
     /// Text of the arena.
     source: String,
+    doorkeeper: Doorkeeper,
 }
 
-fn run_arena(Configured { config, arena, source }: Configured, clock: Clock, out: &Output) -> Result<(), DaemonError> {
+fn run_arena(configured: Configured, clock: Clock, out: &Output) -> Result<(), DaemonError> {
+    let Configured { config, arena, source, doorkeeper } = configured;
     let config = &config;
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(RUNTIME_THREADS).enable_all().build()?;
     runtime.block_on(async {
@@ -131,7 +139,7 @@ fn run_arena(Configured { config, arena, source }: Configured, clock: Clock, out
         let ending = watch_signals(Signals::new()?);
         let shared = Arc::new(share(config, &arena, source, clock)?);
         let (session, endpoint) = network::open(&config.network, &shared.keys).await?;
-        let mut serving = Serving::start(config, arena, &shared, session)?;
+        let mut serving = Serving::start(config, arena, doorkeeper, &shared, session)?;
         out.print(&report::welcome(&endpoint, &metrics::status(&shared)));
         let ended = watch(config, &shared, &mut serving, ending, out).await;
         say_farewell(&shared).await;
@@ -170,7 +178,7 @@ fn share(config: &ServerConfig, arena: &Arena, source: String, clock: Clock) -> 
     }))
 }
 
-/// Prints a status line every few seconds, and reads the arena again on SIGHUP, until a signal comes or a thread ends.
+/// Prints a status line every few seconds, and reads the arena again on SIGHUP or for who may ask, until a signal comes or a thread ends.
 async fn watch(
     config: &ServerConfig,
     shared: &Shared,
@@ -192,10 +200,16 @@ async fn watch(
                 told = now;
             }
             _ = hangup.recv() => {
-                let said = tokio::task::block_in_place(|| reload::reload(config, shared));
+                let (_, said) = tokio::task::block_in_place(|| reload::reload(config, shared));
                 said.iter().for_each(|line| out.print(line));
             }
-            name = serving.thread_ended() => return Err(DaemonError::ThreadEnded(name)),
+            happening = serving.next() => match happening {
+                Happening::ThreadEnded(name) => return Err(DaemonError::ThreadEnded(name)),
+                Happening::Ordered(order) => {
+                    let said = tokio::task::block_in_place(|| reload::obey(&order, config, shared));
+                    said.iter().for_each(|line| out.print(line));
+                }
+            },
             // An error would be the end of the task that watches, which ends with the process only.
             _ = &mut ending => break,
         }

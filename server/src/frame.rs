@@ -30,6 +30,8 @@ pub struct Frame {
     pub totals: Totals,
     /// What happened since the last frame, in order.
     pub events: Vec<ArenaEvent>,
+    /// What the actors of each kind do, in order of their names.
+    pub kinds: Vec<KindFigures>,
     /// What the ticks since the last frame cost; this frame's is the last.
     pub records: Vec<TickRecord>,
     /// Acknowledgements of all players.
@@ -37,6 +39,17 @@ pub struct Frame {
     /// From arrival to the tick, of each input that the tick applied, µs.
     pub input_waits_us: Vec<u32>,
     dof: Dof,
+}
+
+/// What the actors of a kind do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KindFigures {
+    /// Name of the kind.
+    pub kind: &'static str,
+    /// How many acted in the last tick.
+    pub actors: u32,
+    /// Their sporadic jobs since the start.
+    pub sporadic: u64,
 }
 
 /// Counts since the start.

@@ -13,6 +13,7 @@
 //! and lock-free; locks are shared only by threads that serve the network. Pure, and tested without threads: sessions
 //! ([`sessions`]), who is sent to whom ([`selection`]), pacing ([`pacer`]), controls ([`drivers`]), matching of players and sessions ([`boarding`]).
 
+pub mod admin;
 pub mod answers;
 pub mod arena_source;
 pub mod boarding;
@@ -31,6 +32,7 @@ pub mod network;
 pub mod output;
 pub mod pacer;
 pub mod publish;
+mod reload_command;
 pub mod report;
 pub mod selection;
 pub mod sessions;

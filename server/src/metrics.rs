@@ -5,9 +5,9 @@
 use std::collections::VecDeque;
 
 use pita_protocol::build_info::VERSION_AND_COMMIT;
-use pita_protocol::message::{Status, TICK_RECORDS_MAX, TickRecord, TickRecords};
+use pita_protocol::message::{KINDS_MAX, KindStatus, Status, TICK_RECORDS_MAX, TickRecord, TickRecords};
 
-use crate::frame::{Frame, Totals};
+use crate::frame::{Frame, KindFigures, Totals};
 use crate::shared::Shared;
 use crate::stopwatch;
 
@@ -15,6 +15,8 @@ use crate::stopwatch;
 const WINDOW_S: u64 = 10;
 /// Distance of the samples that rates are taken from, ms.
 const RATE_SAMPLE_MS: u64 = 500;
+/// Characters of a kind's name that are told: 48 bytes, whatever they are.
+const KIND_CHARS: usize = 12;
 /// Inputs of which the wait is kept: ten seconds of 32 players at 30 Hz.
 const INPUT_WAITS_MAX: usize = 9600;
 
@@ -27,6 +29,7 @@ pub struct Metrics {
     state_hash: u64,
     bodies: u32,
     totals: Totals,
+    kinds: Vec<KindFigures>,
 }
 
 /// Payload so far at one moment.
@@ -51,6 +54,7 @@ impl Metrics {
             state_hash: 0,
             bodies: 0,
             totals: Totals::default(),
+            kinds: Vec::new(),
         }
     }
 
@@ -69,6 +73,7 @@ impl Metrics {
             self.input_waits_us.push_back(wait);
         }
         (self.state_hash, self.bodies, self.totals) = (frame.state_hash, frame.bodies, frame.totals);
+        self.kinds.clone_from(&frame.kinds);
     }
 
     /// Takes a sample of the traffic, unless the last one is fresh.
@@ -91,6 +96,15 @@ impl Metrics {
     /// Counts since the start.
     pub fn totals(&self) -> Totals {
         self.totals
+    }
+
+    /// What actors do, as it is told.
+    fn kinds(&self) -> Vec<KindStatus> {
+        let told = |figures: &KindFigures| {
+            let kind = figures.kind.chars().take(KIND_CHARS).collect();
+            KindStatus { kind, actors: figures.actors, sporadic: figures.sporadic }
+        };
+        self.kinds.iter().take(KINDS_MAX).map(told).collect()
     }
 
     /// Median and 99th percentile of the tick time over the last ten seconds, ms; zero before the first tick.
@@ -151,6 +165,7 @@ pub fn status(shared: &Shared) -> Status {
         input_wait_p50_ms,
         input_wait_p99_ms,
         refused: shared.counters.refused(),
+        kinds: metrics.kinds(),
         state_hash: metrics.state_hash,
     }
 }

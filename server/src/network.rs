@@ -155,6 +155,7 @@ fn access_rules(keys: &Keys) -> serde_json::Value {
         keys.source(),
         keys.status(),
         keys.ticks(),
+        keys.admin(),
         ANY_JOIN.to_owned(),
         ANY_STATUS.to_owned(),
     ];

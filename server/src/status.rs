@@ -1,11 +1,11 @@
-//! `pita-server status`: asks a running server how it does.
+//! `pita-server status`: asks a running server how it does. Owns how the command line asks a server anything.
 
 use std::process::ExitCode;
 use std::time::Duration;
 
 use comfy_table::{Cell, CellAlignment, Table, presets};
 use pita_protocol::message::Status;
-use pita_protocol::{decode, keys};
+use pita_protocol::{Message, decode, keys};
 use serde_json::json;
 
 use crate::cli::StatusArgs;
@@ -64,15 +64,36 @@ pub fn run(args: &StatusArgs) -> ExitCode {
 /// # Errors
 /// [`StatusError`], within eight seconds.
 pub async fn ask(endpoint: &str) -> Result<Status, StatusError> {
+    let session = connect(endpoint).await?;
+    question(&session, endpoint, keys::ANY_STATUS, Vec::new()).await
+}
+
+/// Connects to the server at `endpoint`.
+///
+/// # Errors
+/// [`StatusError::NoServer`].
+pub(crate) async fn connect(endpoint: &str) -> Result<zenoh::Session, StatusError> {
     let no_server = |reason: String| StatusError::NoServer { endpoint: endpoint.to_owned(), reason };
     let config = client_configuration(endpoint).map_err(|error| no_server(error.to_string()))?;
-    let session = tokio::time::timeout(OPEN_TIMEOUT, zenoh::open(config))
+    tokio::time::timeout(OPEN_TIMEOUT, zenoh::open(config))
         .await
         .map_err(|_| no_server(format!("no connection within {} s", OPEN_TIMEOUT.as_secs())))?
-        .map_err(|_| no_server("no connection".to_owned()))?;
+        .map_err(|_| no_server("no connection".to_owned()))
+}
+
+/// Asks the server at `endpoint` on `key`, with `payload`.
+///
+/// # Errors
+/// [`StatusError::NoAnswer`] and [`StatusError::Unreadable`].
+pub(crate) async fn question<M: Message>(
+    session: &zenoh::Session,
+    endpoint: &str,
+    key: &str,
+    payload: Vec<u8>,
+) -> Result<M, StatusError> {
     let unreadable = |reason: String| StatusError::Unreadable { endpoint: endpoint.to_owned(), reason };
-    let replies =
-        session.get(keys::ANY_STATUS).timeout(ANSWER_TIMEOUT).await.map_err(|error| unreadable(error.to_string()))?;
+    let asked = session.get(key).payload(payload).timeout(ANSWER_TIMEOUT);
+    let replies = asked.await.map_err(|error| unreadable(error.to_string()))?;
     while let Ok(reply) = replies.recv_async().await {
         if let Ok(sample) = reply.result() {
             return decode(&sample.payload().to_bytes()).map_err(|error| unreadable(error.to_string()));
@@ -115,6 +136,10 @@ fn table_of(status: &Status) -> String {
     row("awake DOF", status.dof_awake.to_string());
     row("contacts", status.contacts.to_string());
     row("quarantined", status.quarantined.to_string());
+    for kind in status.kinds.iter().filter(|kind| kind.actors > 0) {
+        let a_tick = kind.sporadic as f64 / status.tick.max(1) as f64;
+        row(&format!("{}: actors, sporadic jobs a tick", kind.kind), format!("{}, {a_tick:.2}", kind.actors));
+    }
     row("sent", report::rate(status.sent_bytes_per_s));
     row("received", report::rate(status.received_bytes_per_s));
     let inputs = &status.inputs;

@@ -13,7 +13,7 @@ use pita_protocol::message::{TICK_RECORDS_MAX, TickRecord};
 
 use crate::boarding::Boarding;
 use crate::drivers::{Drivers, Now};
-use crate::frame::{Frame, Totals};
+use crate::frame::{Frame, KindFigures, Totals};
 use crate::pacer::Pacer;
 use crate::shared::{Phase, Shared};
 use crate::stopwatch::ThreadUse;
@@ -42,6 +42,8 @@ struct Outside {
     /// Ticks left out so far: the arena's count plus this is the number of a tick.
     skipped: u64,
     quarantined: u64,
+    /// Of every kind that ever acted, in order of their names.
+    kinds: Vec<KindFigures>,
     frames_missed: u64,
     frame: Option<Box<Frame>>,
     record: TickRecord,
@@ -61,6 +63,7 @@ impl Outside {
             thread_use: ThreadUse::of_this_thread(),
             skipped: 0,
             quarantined: 0,
+            kinds: Vec::new(),
             frames_missed: 0,
             frame: None,
             record: TickRecord::default(),
@@ -147,6 +150,21 @@ impl Outside {
         self.record.contacts = count(report.contacts);
         self.record.newton_iterations = count(report.iterations);
         self.record.linear_iterations = count(report.linear_iterations);
+        self.record.actors = count(arena.logic().actors);
+        self.record.sporadic = count(arena.logic().sporadic);
+        self.count_logic(arena);
+    }
+
+    fn count_logic(&mut self, arena: &Arena) {
+        for (kind, logic) in arena.logic_by_kind() {
+            let place = self.kinds.binary_search_by_key(&kind, |figures| figures.kind).unwrap_or_else(|place| {
+                self.kinds.insert(place, KindFigures { kind, actors: 0, sporadic: 0 });
+                place
+            });
+            let figures = &mut self.kinds[place];
+            figures.actors = u32::try_from(logic.actors).unwrap_or(u32::MAX);
+            figures.sporadic += logic.sporadic as u64;
+        }
     }
 }
 
@@ -173,6 +191,7 @@ impl Ports for Outside {
         match &mut self.frame {
             Some(frame) => {
                 frame.tick = self.record.tick;
+                frame.kinds.clone_from(&self.kinds);
                 frame.copy_state(arena.world(), arena.relevant_actors());
                 self.drivers.acks(&mut frame.acks);
                 frame.input_waits_us.extend_from_slice(self.drivers.waits_us());

@@ -24,7 +24,7 @@ use crate::arena_file::{BoundsFile, Materials};
 use crate::combat::CombatParameters;
 use crate::pipeline::Ports;
 use crate::spawn::Pose;
-use crate::step::{Effect, LogicReport, Other, Request};
+use crate::step::{Effect, KindLogic, LogicReport, Other, Request};
 use crate::vehicle::VehicleParameters;
 use cast::Cast;
 pub use rounds::Rounds;
@@ -166,6 +166,8 @@ pub struct Arena {
     others: Vec<Other>,
     requests: Vec<Request>,
     logic: LogicReport,
+    /// By kind; kinds that were there once stay, with nothing.
+    logic_by_kind: BTreeMap<&'static str, KindLogic>,
     /// What the file placed.
     placed: Placed,
     /// What the coming tick changes about that, in order.
@@ -246,6 +248,11 @@ impl Arena {
     /// What logic did in the last tick.
     pub fn logic(&self) -> &LogicReport {
         &self.logic
+    }
+
+    /// The same by kind of actor, in order of their names.
+    pub fn logic_by_kind(&self) -> impl Iterator<Item = (&'static str, KindLogic)> {
+        self.logic_by_kind.iter().map(|(&kind, &logic)| (kind, logic))
     }
 
     /// From the next tick on, the engine says how much energy came from nowhere: see

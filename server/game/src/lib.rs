@@ -42,4 +42,4 @@ pub use part::{PartInfo, PartMount};
 pub use pipeline::{Ports, Stage};
 pub use rehearsal::{BodyState, CarState, Memory, Rehearsal};
 pub use spawn::Pose;
-pub use step::{Effect, LogicReport, Message, Other, Step};
+pub use step::{Effect, KindLogic, LogicReport, Message, Other, Step};

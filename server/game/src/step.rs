@@ -105,6 +105,15 @@ pub struct LogicReport {
     pub refused: usize,
 }
 
+/// What the actors of a kind did in a tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct KindLogic {
+    /// How many acted.
+    pub actors: usize,
+    /// Their sporadic jobs that were due.
+    pub sporadic: usize,
+}
+
 /// What an actor may touch in stage 3.
 pub struct Step<'a> {
     /// The world, contacts of this tick included: to look at, and to push on.

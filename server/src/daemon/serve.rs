@@ -5,11 +5,12 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use pita_game::Arena;
-use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use tokio::sync::mpsc::{Receiver, UnboundedReceiver, UnboundedSender, channel, unbounded_channel};
 use zenoh::Wait;
 use zenoh::sample::SampleKind;
 
 use super::DaemonError;
+use crate::admin::{Doorkeeper, Order};
 use crate::answers::{Answering, Asker, Question, Work};
 use crate::config::{ServerConfig, Tick};
 use crate::drivers::Drivers;
@@ -22,12 +23,24 @@ use crate::{inputs, tick_thread};
 /// Longest wait for Zenoh to close; it can hang (zenoh#2675).
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
 
+/// Orders that may wait for the daemon's own loop.
+const ORDERS_MAX: usize = 4;
+
+/// What the daemon's own loop has to see to.
+pub enum Happening {
+    /// A thread ended by itself.
+    ThreadEnded(&'static str),
+    /// Somebody who may wants something done.
+    Ordered(Order),
+}
+
 /// Everything that runs.
 pub struct Serving {
     session: zenoh::Session,
     asker: Asker,
     threads: Vec<JoinHandle<()>>,
     ended: UnboundedReceiver<&'static str>,
+    orders: Receiver<Order>,
 }
 
 impl Serving {
@@ -35,10 +48,12 @@ impl Serving {
     pub fn start(
         config: &ServerConfig,
         arena: Arena,
+        doorkeeper: Doorkeeper,
         shared: &Arc<Shared>,
         session: zenoh::Session,
     ) -> Result<Self, DaemonError> {
-        let (answering, asker) = Answering::new(shared.clone());
+        let (ordering, orders) = channel(ORDERS_MAX);
+        let (answering, asker) = Answering::new(shared.clone(), doorkeeper, ordering);
         let publishing = Publishing::new(shared.clone(), session.clone(), asker.clone())?;
         let (ending, ended) = unbounded_channel();
         let mut threads = vec![
@@ -49,12 +64,15 @@ impl Serving {
         let drivers = drivers(config, shared);
         let (tick, shared) = (config.tick, shared.clone());
         threads.push(spawn("tick", &ending, move || tick_thread::run(arena, drivers, pacer(tick, &shared), shared))?);
-        Ok(Self { session, asker, threads, ended })
+        Ok(Self { session, asker, threads, ended, orders })
     }
 
-    /// Waits for a thread that ends by itself; answers its name.
-    pub async fn thread_ended(&mut self) -> &'static str {
-        self.ended.recv().await.unwrap_or("last")
+    /// Waits for what happens next that the daemon's own loop has to see to.
+    pub async fn next(&mut self) -> Happening {
+        tokio::select! {
+            name = self.ended.recv() => Happening::ThreadEnded(name.unwrap_or("last")),
+            Some(order) = self.orders.recv() => Happening::Ordered(order),
+        }
     }
 
     /// Ends threads and network.
@@ -79,6 +97,7 @@ fn declare(shared: &Arc<Shared>, session: &zenoh::Session, asker: &Asker) -> zen
         (keys.source(), Question::Source),
         (keys.status(), Question::Status),
         (keys.ticks(), Question::Ticks),
+        (keys.admin(), Question::Admin),
         (keys.join(), Question::Join),
         (keys.all_says(), Question::Say),
     ] {

@@ -15,6 +15,7 @@ mod kinds;
 mod leaving;
 mod programs;
 mod refusals;
+mod reloading;
 mod resuming;
 mod routers;
 mod run;

@@ -82,6 +82,7 @@ impl Arena {
             others: Vec::new(),
             requests: Vec::new(),
             logic: LogicReport::default(),
+            logic_by_kind: BTreeMap::new(),
             placed: Placed::default(),
             reloads: Vec::new(),
         };

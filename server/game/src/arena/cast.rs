@@ -51,6 +51,13 @@ impl Arena {
         filled
     }
 
+    /// Those who fill places go; others, as `file` has them, come in their place before the tick is over.
+    pub(super) fn recast(&mut self, file: &ArenaFile) {
+        let old = self.cast.take();
+        old.iter().flat_map(|cast| &cast.actors).for_each(|&id| self.remove(id));
+        self.cast = Cast::new(file);
+    }
+
     fn add_filler(&mut self, cast: &mut Cast) -> Result<(), SimError> {
         let id = self.new_id();
         let pose = self.free_spawn(id);

@@ -6,7 +6,7 @@ use super::{Arena, ArenaEvent};
 use crate::actor::{Actor, WhenLost};
 use crate::arena_file::ACTORS_MAX;
 use crate::spawn::{self, Pose};
-use crate::step::{EFFECTS_MAX, LogicReport, Other, Request, Step};
+use crate::step::{EFFECTS_MAX, KindLogic, LogicReport, Other, Request, Step};
 
 impl Arena {
     /// Lets every actor judge its collisions, sees to those who are lost, lets every actor act, in order of id, and does
@@ -81,11 +81,16 @@ impl Arena {
             requests: &mut self.requests,
             report: &mut self.logic,
         };
+        self.logic_by_kind.values_mut().for_each(|logic| *logic = KindLogic::default());
         for (&id, actor) in &mut self.actors {
+            let before = step.report.sporadic;
             step.id = id;
             if actor.step(&mut step).is_err() {
                 self.lost.push(id);
             }
+            let of_kind = self.logic_by_kind.entry(actor.describe().kind).or_default();
+            of_kind.actors += 1;
+            of_kind.sporadic += step.report.sporadic - before;
         }
     }
 

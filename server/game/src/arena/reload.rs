@@ -11,7 +11,8 @@ use crate::arena_file::{ArenaError, ArenaFile, with_parameters};
 use crate::kinds::Recipe;
 
 /// Keys of a file that may change while the arena runs.
-const SAFE: [&str; 8] = ["actors", "drivers", "routes", "vehicle", "spawns", "spawn_grids", "bounds", "parameters"];
+const SAFE: [&str; 9] =
+    ["actors", "ai", "drivers", "routes", "vehicle", "spawns", "spawn_grids", "bounds", "parameters"];
 
 /// Why a text cannot take the place of another; nothing was changed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -32,6 +33,8 @@ pub struct Reload {
     /// For each table of the new file the equal one of the old that it takes over.
     actors: Vec<Option<usize>>,
     drivers: Vec<Option<usize>>,
+    /// Those who fill empty places come anew.
+    recasts: bool,
 }
 
 impl Reload {
@@ -53,11 +56,12 @@ impl Reload {
         // An actor may have looked at any table when it was built.
         let changes = |key| changed.contains(&key);
         let keep_actors = !changes("routes") && !changes("bounds");
+        let recasts = changes("ai") || changes("routes");
         let keep_drivers = !changes("routes") && !changes("vehicle");
         let actors = matches(&old, &new, "actors", keep_actors);
         let drivers = matches(&old, &new, "drivers", keep_drivers);
         let changed = changed.into_iter().map(str::to_owned).collect();
-        Ok(Self { file, recipes, changed, actors, drivers })
+        Ok(Self { file, recipes, changed, actors, drivers, recasts })
     }
 
     /// What changes, for people; empty where nothing does.
@@ -88,7 +92,7 @@ impl Arena {
         std::mem::take(&mut self.reloads).into_iter().for_each(|reload| self.do_reload(reload));
     }
 
-    fn do_reload(&mut self, Reload { file, recipes, actors, drivers, .. }: Reload) {
+    fn do_reload(&mut self, Reload { file, recipes, actors, drivers, recasts, .. }: Reload) {
         let old = std::mem::take(&mut self.placed);
         self.remove_unless_kept(&old.actors, &actors);
         self.remove_unless_kept(&old.drivers, &drivers);
@@ -107,6 +111,9 @@ impl Arena {
             placed.drivers.push(ids.unwrap_or_default());
         }
         self.placed = placed;
+        if recasts {
+            self.recast(&file);
+        }
     }
 
     fn remove_unless_kept(&mut self, old: &[Vec<u32>], matches: &[Option<usize>]) {

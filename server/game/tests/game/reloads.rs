@@ -55,6 +55,33 @@ fn what_is_not_safe_or_not_valid_changes_nothing_and_says_so() {
     assert_eq!(between(&old, &old).ok().map(|reload| reload.changes()), Some(Vec::new()));
 }
 
+/// Those who fill empty places follow the route that the file has now, at its speed; players stay.
+#[test]
+fn those_who_fill_places_come_anew() {
+    let with_ai = |drivers: usize, z: f64| {
+        let corners = format!("[[-60.0, {z:?}], [60.0, {z:?}]]");
+        let ai = format!("[ai]\ndrivers = {drivers}\nroute = \"there\"\nspeed = 12.0\n");
+        format!("{FLAT}\n[routes.there]\ncorners = {corners}\n{ai}")
+    };
+    let (old, new) = (with_ai(3, 0.0), with_ai(2, 40.0));
+    let mut track = TestTrack::new(&old, SETTINGS);
+    track.enter(0);
+    track.run(2.0, Controls::default());
+    let own = |track: &TestTrack| -> Vec<u32> {
+        let is_own = |actor: &&pita_game::ActorInfo| actor.slot.is_none();
+        track.arena.actors().filter(is_own).map(|actor| actor.id).collect()
+    };
+    let before = own(&track);
+    assert_eq!(before.len(), 2, "three less the player");
+    track.arena.schedule(between(&old, &new).unwrap_or_else(|error| panic!("{error}")));
+    track.tick();
+    let after = own(&track);
+    assert!(after.len() == 1 && !before.contains(&after[0]), "{before:?}, then {after:?}");
+    track.run(12.0, Controls::default());
+    let at = track.arena.world().position(track.arena.actor(after[0]).expect("it drives").bodies()[0]).unwrap();
+    assert!((at.z - 40.0).abs() < 12.0, "it follows the new route: {at}");
+}
+
 #[test]
 fn new_cars_have_the_new_parameters() {
     let mut track = TestTrack::new(FLAT, SETTINGS);
