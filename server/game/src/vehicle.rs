@@ -102,9 +102,10 @@ impl Vehicle {
         })
     }
 
-    /// The same car, which fights where there are rules for that.
-    pub fn in_combat(self, combat: Option<CombatParameters>) -> Self {
-        Self { fighter: combat.map(Fighter::new), ..self }
+    /// The same car, which fights where there are rules for that; it may fire where a round is on.
+    pub fn in_combat(self, combat: Option<CombatParameters>, may_fire: bool) -> Self {
+        let fighter = combat.map(|combat| Fighter::new(self.info.id, combat, may_fire));
+        Self { fighter, ..self }
     }
 
     /// Lets it be knocked out, come back and fire.
@@ -265,6 +266,8 @@ impl Actor for Vehicle {
         self.move_wheels(step, speed)?;
         self.drag(step, &motion)?;
         let footing = self.footing(step.world);
+        // As it stands now: nothing else is done by how it lay.
+        let motion = Motion::of(step.world, chassis).ok_or(SimError::Gone { what: "the chassis" })?;
         let (rig, parameters, controls) = (&self.rig, &self.parameters, &self.controls);
         let (world, dt, motion) = (&mut *step.world, step.dt, &motion);
         self.stunts.act(Stage { world, rig, parameters, controls, motion, footing, dt })?;
@@ -283,9 +286,6 @@ impl Actor for Vehicle {
 
     fn place(&mut self, world: &mut World, pose: Pose) -> Result<(), SimError> {
         (self.response, self.drive_train) = (Pedals::default(), DriveTrain::default());
-        if let Some(fighter) = self.fighter.as_mut().filter(|fighter| fighter.is_out()) {
-            fighter.restore();
-        }
         if let Some(squash) = &mut self.squash {
             squash.reset(world)?;
         }

@@ -74,7 +74,8 @@ impl Arena {
     pub(super) fn add_own_car(&mut self, id: u32, name: String, driver: AiDriver, pose: Pose) -> Result<(), SimError> {
         let (identity, driver) = (Identity { id, name, slot: None }, Driver::Own(driver));
         let vehicle = Vehicle::add(&mut self.world, identity, self.vehicle.clone(), driver, pose)?;
-        self.add(Box::new(vehicle.in_combat(self.combat.clone())));
+        let vehicle = self.armed(vehicle);
+        self.add(Box::new(vehicle));
         Ok(())
     }
 }

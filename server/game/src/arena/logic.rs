@@ -185,6 +185,9 @@ impl Arena {
         let info = actor.describe().clone();
         self.owners.extend(actor.bodies().iter().map(|&body| (body, info.id)));
         self.actors.insert(info.id, actor);
+        if let Some(rounds) = &mut self.rounds {
+            rounds.forget(id);
+        }
         self.events.push(ArenaEvent::ActorAdded(info));
     }
 

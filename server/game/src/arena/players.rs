@@ -28,7 +28,8 @@ impl Arena {
         let identity = Identity { id, name: name.clone(), slot: Some(slot) };
         match Vehicle::add(&mut self.world, identity, self.vehicle.clone(), Driver::Player, pose) {
             Ok(vehicle) => {
-                self.add(Box::new(vehicle.in_combat(self.combat.clone())));
+                let vehicle = self.armed(vehicle);
+                self.add(Box::new(vehicle));
                 self.slots.insert(slot, id);
                 self.events.push(ArenaEvent::Entered { slot, name });
             }

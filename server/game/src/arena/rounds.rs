@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use super::{Arena, ArenaEvent};
 use crate::combat::parameters::RoundParameters;
 use crate::step::Message;
+use crate::vehicle::Vehicle;
 
 /// The round that is on, and its score.
 #[derive(Clone, Debug)]
@@ -62,14 +63,26 @@ impl Rounds {
         Some((by, *points))
     }
 
+    /// Who is gone takes his points along.
+    pub(super) fn forget(&mut self, actor: u32) {
+        self.points.remove(&actor);
+    }
+
     fn is_over(&self) -> bool {
         self.left <= 0.0 || self.points.values().any(|&points| points >= self.parameters.points)
     }
 }
 
 impl Arena {
-    /// Somebody is knocked out.
+    /// A vehicle as the arena's rules have it.
+    pub(super) fn armed(&self, vehicle: Vehicle) -> Vehicle {
+        vehicle.in_combat(self.combat.clone(), self.rounds.as_ref().is_some_and(Rounds::is_on))
+    }
+
+    /// Somebody is knocked out, by whom is the merit of nobody who is gone.
     pub(super) fn knock_out(&mut self, actor: u32, by: Option<u32>) {
+        // A weapon may outlive who fired it.
+        let by = by.filter(|by| self.actors.contains_key(by));
         self.events.push(ArenaEvent::KnockedOut { actor, by });
         if let Some((actor, points)) = self.rounds.as_mut().and_then(|rounds| rounds.score(actor, by)) {
             self.events.push(ArenaEvent::Scored { actor, points });

@@ -10,6 +10,8 @@ use crate::step::{Message, Step};
 /// A vehicle's share in combat.
 #[derive(Clone, Debug)]
 pub struct Fighter {
+    /// The vehicle's: harm that it does itself is nobody's merit.
+    id: u32,
     parameters: CombatParameters,
     health: f64,
     /// Time until the next life, s; `None` while it fights.
@@ -28,10 +30,11 @@ pub struct Fighter {
 }
 
 impl Fighter {
-    /// A fighter in full health.
-    pub fn new(parameters: CombatParameters) -> Self {
+    /// The fighter of actor `id`, in full health; it may fire where a round is on.
+    pub fn new(id: u32, parameters: CombatParameters, may_fire: bool) -> Self {
         let health = parameters.health;
         Self {
+            id,
             parameters,
             health,
             out_for: None,
@@ -39,7 +42,7 @@ impl Fighter {
             weapon: 0,
             next_was_held: false,
             reload: 0.0,
-            may_fire: true,
+            may_fire,
             asks_respawn: false,
         }
     }
@@ -96,7 +99,7 @@ impl Fighter {
             return;
         }
         self.health -= harm;
-        if let Some(by) = by {
+        if let Some(by) = by.filter(|&by| by != self.id) {
             self.attacker = Some((by, self.parameters.credit_time));
         }
     }
@@ -109,12 +112,15 @@ impl Fighter {
         if self.asks_respawn {
             self.asks_respawn = false;
             step.respawn();
+            // What it fired now would come from where it no longer is.
+            return Ok(());
         }
         self.attacker = self.attacker.map(|(by, left)| (by, left - step.dt)).filter(|(_, left)| *left > 0.0);
         self.reload = (self.reload - step.dt).max(0.0);
         if let Some(left) = &mut self.out_for {
             *left -= step.dt;
             if *left <= 0.0 {
+                self.restore();
                 step.respawn();
             }
             return Ok(());

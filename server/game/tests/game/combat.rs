@@ -186,3 +186,86 @@ fn a_glove_without_its_car_is_gone() {
     }
     assert_eq!(kinds(&track), ["vehicle"]);
 }
+
+/// Points are of those who are there: who leaves takes them along, and scores no more.
+#[test]
+fn who_has_left_neither_leads_nor_scores() {
+    let keys = "health = 10.0\nrespawn_time = 1.0\nweapons = [\"saw\"]\nround = { points = 9 }";
+    let mut track = duel(keys, 10.0);
+    both(&mut track, 1.5, FIRE);
+    let shooter = id(&track, 0);
+    assert_eq!(track.arena.rounds().unwrap().leader(), Some(shooter));
+    track.leave(0);
+    track.tick();
+    assert_eq!(track.arena.rounds().unwrap().leader(), None);
+    let mut track = duel(keys, 15.0);
+    both(&mut track, 0.1, FIRE);
+    let [shooter, victim] = [id(&track, 0), id(&track, 1)];
+    track.leave(0);
+    (0..30).for_each(|_| track.tick());
+    assert_eq!(count(&track, |event| *event == ArenaEvent::KnockedOut { actor: victim, by: None }), 1);
+    assert_eq!(count(&track, |event| matches!(event, ArenaEvent::Scored { actor, .. } if *actor == shooter)), 0);
+}
+
+#[test]
+fn who_comes_between_two_rounds_waits_like_the_others() {
+    let keys = "weapons = [\"saw\"]\nsaw.life = 0.5\nround = { time = 1.0, pause = 60.0 }";
+    let mut track = duel(keys, 30.0);
+    both(&mut track, 1.0, COAST);
+    assert!(!track.arena.rounds().unwrap().is_on());
+    track.leave(0);
+    track.enter(0);
+    both(&mut track, 0.5, FIRE);
+    assert_eq!(kinds(&track), ["vehicle", "vehicle"]);
+}
+
+/// Whoever holds the trigger while a round begins fires from where he is put to.
+#[test]
+fn nothing_is_fired_from_where_a_car_was_before_the_round() {
+    let keys = "weapons = [\"saw\"]\nsaw.life = 0.5\nround = { time = 1.0, pause = 2.0 }";
+    let mut track = duel(keys, 150.0);
+    both(&mut track, 1.0, COAST);
+    let began = |track: &TestTrack| count(track, |event| *event == ArenaEvent::RoundBegan { number: 2 }) > 0;
+    for _ in 0..90 {
+        if !began(&track) {
+            both(&mut track, 1.0 / 30.0, FIRE);
+        }
+    }
+    let saw = |track: &TestTrack| track.arena.actors().find(|info| info.kind == "saw").map(|info| info.parts[0].slice);
+    let fired = (0..10).find_map(|_| {
+        both(&mut track, 1.0 / 30.0, FIRE);
+        saw(&track)
+    });
+    let fired = fired.expect("the round is on");
+    let slice = track.arena.world().slices().find(|slice| slice.serial == fired).unwrap();
+    let off = DVec3::from_slice(slice.q).distance(track.car(0).position);
+    assert!(off < 10.0, "{off} m from the car");
+}
+
+/// A car that is put on its wheels does nothing more by how it lay before.
+#[test]
+fn a_car_fires_as_it_stands_after_a_reset() {
+    let mut track = duel("weapons = [\"saw\"]", 60.0);
+    let at = track.car(0).position;
+    track.place(0, at + 2.0 * DVec3::Y, DQuat::from_rotation_z(0.45 * PI), DVec3::ZERO);
+    both(&mut track, 1.0 / 30.0, Controls { reset: true, ..FIRE });
+    let saw = track.arena.actors().find(|info| info.kind == "saw").expect("it flies").parts[0].slice;
+    let slice = track.arena.world().slices().find(|slice| slice.serial == saw).unwrap();
+    assert!(slice.v[0] > 20.0 && slice.v[1].abs() < 5.0, "{:?}", slice.v);
+}
+
+/// Who leaves the world while he is out is put back, and is out for as long as everybody.
+#[test]
+fn no_way_out_of_the_world_is_a_short_cut_to_the_next_life() {
+    let mut track = duel("health = 10.0\nrespawn_time = 60.0\nweapons = [\"saw\"]", 10.0);
+    both(&mut track, 1.5, FIRE);
+    assert_eq!(count(&track, |event| matches!(event, ArenaEvent::KnockedOut { .. })), 1);
+    track.place(1, DVec3::Y * -100.0, DQuat::IDENTITY, DVec3::ZERO);
+    both(&mut track, 1.0, COAST);
+    assert!(track.car(1).position.y > 0.0, "put back: {:?}", track.car(1));
+    for _ in 0..30 {
+        track.drive(1, Controls { throttle: 1.0, ..COAST });
+        track.tick();
+    }
+    assert!(track.car(1).velocity.length() < 0.5, "{:?}", track.car(1));
+}
