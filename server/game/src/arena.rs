@@ -159,6 +159,8 @@ pub struct Arena {
     /// Actor of each slot.
     slots: BTreeMap<u16, u32>,
     events: Vec<ArenaEvent>,
+    /// Those of them that the last tick handed out; what was added since is the next one's.
+    told: usize,
     /// Kept from tick to tick for its memory.
     commands: Vec<Command>,
     /// Likewise: those who are lost, and what actors are told of each other and ask for, in this tick.
@@ -240,7 +242,7 @@ impl Arena {
         &self.materials
     }
 
-    /// What happened in the last tick, in order.
+    /// What happened in the last tick, in order, and what was added since.
     pub fn events(&self) -> &[ArenaEvent] {
         &self.events
     }
@@ -263,7 +265,7 @@ impl Arena {
 
     /// Stage 1: takes the commands that came in since the last tick and applies them.
     pub(crate) fn collect_input(&mut self, ports: &mut impl Ports) {
-        self.events.clear();
+        self.events.drain(..self.told);
         self.do_reloads();
         let mut commands = std::mem::take(&mut self.commands);
         ports.collect(self.ticks + 1, &mut commands);
@@ -284,5 +286,6 @@ impl Arena {
     pub(crate) fn integrate(&mut self) {
         self.world.integrate();
         self.ticks += 1;
+        self.told = self.events.len();
     }
 }

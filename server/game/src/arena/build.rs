@@ -77,6 +77,7 @@ impl Arena {
             next_actor: 0,
             slots: BTreeMap::new(),
             events: Vec::new(),
+            told: 0,
             commands: Vec::new(),
             lost: Vec::new(),
             others: Vec::new(),

@@ -39,6 +39,8 @@ impl Arena {
     /// What the engine says where it refuses a car.
     pub(super) fn fill_places(&mut self) -> Result<(), SimError> {
         let Some(mut cast) = self.cast.take() else { return Ok(()) };
+        // Another actor may have taken one away.
+        cast.actors.retain(|id| self.actors.contains_key(id));
         let wanted = cast.ai.drivers.saturating_sub(self.slots.len());
         while cast.actors.len() > wanted {
             cast.actors.pop().into_iter().for_each(|id| self.remove(id));

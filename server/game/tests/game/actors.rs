@@ -287,3 +287,56 @@ fn a_game_adds_kinds_of_its_own() {
     let Err(unknown) = Arena::from_toml(&placed("lift = 9"), &SETTINGS) else { panic!("accepted") };
     assert!(unknown.to_string().contains("actors[0].kind is balloon, allowed: one of"), "{unknown}");
 }
+
+/// What a game adds between two ticks is told of in the next one's events, once.
+#[test]
+fn what_comes_between_two_ticks_is_told_of() {
+    let mut track = TestTrack::new(FLAT, SETTINGS);
+    track.tick();
+    let ball = add(&mut track, 5.0, |_, _| Ok(()));
+    track.tick();
+    track.tick();
+    let is_it = |event: &&ArenaEvent| matches!(event, ArenaEvent::ActorAdded(info) if info.id == ball);
+    assert_eq!(track.ports.events.iter().filter(is_it).count(), 1, "{:?}", track.ports.events);
+}
+
+/// Harm that one does oneself takes nobody's credit.
+#[test]
+fn a_knock_out_is_the_merit_of_who_harmed_last_and_never_ones_own() {
+    let mut track = TestTrack::new(&format!("{FLAT}\n[combat]\nhealth = 100.0\n"), SETTINGS);
+    track.enter(0);
+    track.enter(1);
+    track.tick();
+    let [attacker, victim] = [0, 1].map(|slot| track.arena.actor_of(slot).expect("entered").id);
+    for by in [attacker, victim] {
+        add(&mut track, 30.0 + 3.0 * f64::from(by), move |step, _| {
+            step.tell(victim, Message::Damage { amount: 60.0, by: Some(by) });
+            step.remove_self();
+            Ok(())
+        });
+    }
+    (0..3).for_each(|_| track.tick());
+    let expected = ArenaEvent::KnockedOut { actor: victim, by: Some(attacker) };
+    assert!(track.ports.events.contains(&expected), "{:?}", track.ports.events);
+}
+
+/// A car of the arena's that another actor took away is missed.
+#[test]
+fn the_place_of_who_was_removed_is_filled_again() {
+    let ai = "[routes.ring]\ncorners = [[0.0, 0.0], [40.0, 0.0], [40.0, 40.0]]\n[ai]\ndrivers = 1\nroute = \"ring\"\nspeed = 8.0\n";
+    let mut track = TestTrack::new(&format!("{FLAT}\n{ai}"), SETTINGS);
+    let cars = |track: &TestTrack| -> Vec<u32> {
+        track.arena.actors().filter(|info| info.kind == "vehicle").map(|info| info.id).collect()
+    };
+    let first = cars(&track);
+    assert_eq!(first.len(), 1);
+    let removed = first[0];
+    add(&mut track, 60.0, move |step, _| {
+        if step.tick == 2 {
+            step.remove(removed);
+        }
+        Ok(())
+    });
+    (0..4).for_each(|_| track.tick());
+    assert!(cars(&track).len() == 1 && cars(&track) != first, "{:?}", cars(&track));
+}
