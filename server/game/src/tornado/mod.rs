@@ -95,7 +95,7 @@ impl ActorKind for Tornado {
             victims: Victims::default(),
             dust_angle: 0.0,
             touches_ground: false,
-            seen: Vec::with_capacity(p.victims),
+            seen: Vec::new(),
             bodies,
             column,
             path,
@@ -177,8 +177,7 @@ impl Actor for Tornado {
             self.touches_ground |= contact.phase != Phase::End && contact.gap <= p.foot_radius - p.reach;
         }
         if let Some(body) = contact.other.body.filter(|_| self.is_valid_victim(contact)) {
-            let is_news = !self.seen.contains(&body) && self.seen.len() < self.seen.capacity();
-            self.seen.extend(is_news.then_some(body));
+            self.seen.push(body);
         }
         Response::Pass
     }

@@ -237,3 +237,38 @@ fn wrong_parameters_are_named() {
     let quick = tornado(0.0, "").replace("0.06 }", "1.5, damping_ratio = 0.3 }");
     assert!(refused(&quick, &ArenaSettings { tick_hz: 5, ..SETTINGS }).contains("leg 0"));
 }
+
+/// What it may not take does not hide from it what it may.
+#[test]
+fn it_sees_past_what_is_too_heavy() {
+    let crate_of = |name: &str, mass: f64, x: f64, z: f64| {
+        format!(
+            "[[actors]]\nkind = \"prop\"\nname = \"{name}\"\nshape.box.half = [0.4, 0.4, 0.4]\nmaterial = \"asphalt\"\n\
+             mass = {mass:?}\nposition = [{x:?}, 0.4, {z:?}]\n"
+        )
+    };
+    let legs = "legs = [{ to = [0.0, 0.0, 0.0], frequency = 0.1 }]";
+    let twister = format!("[[actors]]\nkind = \"tornado\"\nposition = [0.0, 0.0, 0.0]\nvictims = 1\n{STAYS}\n{legs}\n");
+    let heavy = [(-2.0, 1.0), (2.0, 1.0), (0.0, -2.5)].map(|(x, z)| crate_of("heavy", 9_000.0, x, z)).concat();
+    let light = crate_of("light", 20.0, 0.0, 2.5);
+    let mut track = TestTrack::new(&format!("{FLAT}{heavy}{light}{twister}"), SETTINGS);
+    let serial = named(&track, "light")[0].parts[0].slice;
+    let flight = watch(&mut track, &[serial], 8.0).remove(0);
+    assert!(flight.highest > 5.0, "{} m", flight.highest);
+}
+
+/// Dust that is blown out of the world is no reason to begin its way anew.
+#[test]
+fn it_is_where_its_column_is_and_not_its_dust() {
+    let bounds = "[bounds]\nmin = [-31.0, -20.0, -31.0]\nmax = [31.0, 10.0, 31.0]\n";
+    let legs = "legs = [{ to = [30.0, 0.0, 0.0], frequency = 0.2 }]";
+    let twister = format!("[[actors]]\nkind = \"tornado\"\nposition = [29.9, 0.0, 0.0]\n{STAYS}\n{legs}\n");
+    let flat = FLAT.replace("count = [8, 8]", "count = [1, 1]");
+    let mut track = TestTrack::new(&format!("{flat}{bounds}{twister}"), SETTINGS);
+    let mut lost = 0;
+    for _ in 0..6 * 30 {
+        track.tick();
+        lost += track.arena.logic().lost;
+    }
+    assert_eq!(lost, 0);
+}
