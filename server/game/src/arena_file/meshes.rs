@@ -20,6 +20,7 @@ impl ArenaFile {
     pub fn read_meshes(&mut self, read: impl Fn(&str) -> Result<Vec<u8>, String>) -> Result<(), ArenaError> {
         let mut triangles = 0;
         for (i, piece) in self.statics.iter_mut().enumerate() {
+            let copies = piece.block().count();
             let Some(name) = &piece.mesh else { continue };
             let key = Key::new("statics").index(i).at("mesh");
             let bytes = match read(name) {
@@ -28,8 +29,8 @@ impl ArenaFile {
             };
             let surface = Geometry::from_file(name, &bytes).and_then(|geometry| geometry.surface());
             let surface = surface.map_err(|source| ArenaError::Engine { key: format!("{key}, {name}"), source })?;
-            triangles += surface.triangles().len();
-            key.count(triangles, 1, TRIANGLES_MAX, "triangles, those of earlier meshes included")?;
+            triangles += copies * surface.triangles().len();
+            key.count(triangles, 1, TRIANGLES_MAX, "triangles, those of copies and earlier meshes included")?;
             piece.surface = Some(Arc::new(surface));
         }
         Ok(())

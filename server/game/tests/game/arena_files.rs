@@ -272,3 +272,25 @@ fn statics_may_be_meshes() {
     let both = with("a.obj").replacen("mesh =", "shape.half_space = {}\nmesh =", 1);
     assert!(refusal(&both).contains("either shape or mesh"), "{}", refusal(&both));
 }
+
+/// Every copy of a mesh is in the description that clients join with.
+#[test]
+fn triangles_are_counted_with_copies() {
+    let piece = "[[statics]]\nmesh = \"square.obj\"\nmaterial = \"asphalt\"\ncopies = [4096, 1, 1]\n";
+    let text = FLAT.replacen("[[spawn_grids]]", &format!("{piece}[[spawn_grids]]"), 1);
+    let text = text.replacen("[[statics]]\nshape.half_space = {}\nmaterial = \"asphalt\"\n", "", 1);
+    let hexagon = "v 3 0 0\nv 2 0 3\nv -2 0 3\nv -3 0 0\nv -2 0 -3\nv 2 0 -3\nv 1 0 -4\nf 1 7 6 5 4 3 2\n";
+    let supplies = Supplies { kinds: &ActorKinds::none(), read: &|_| Ok(hexagon.as_bytes().to_vec()) };
+    let Err(error) = Arena::from_toml_with(&text, &SETTINGS, &supplies) else { panic!("accepted") };
+    assert!(error.to_string().starts_with("statics[0].mesh is 20480, allowed: 1 to 16384 triangles"), "{error}");
+}
+
+/// What would be lost where it is placed is refused.
+#[test]
+fn actors_are_within_the_bounds_with_all_that_is_theirs() {
+    let bounds = "[bounds]\nmin = [-100.0, -20.0, -100.0]\nmax = [100.0, 80.0, 100.0]\n";
+    let fence = "[[actors]]\nkind = \"fence\"\nmaterial = \"asphalt\"\nboards = 64\nposition = [0.0, 0.0, 50.0]\n";
+    let said = refusal(&format!("{FLAT}{bounds}{fence}"));
+    assert!(said.starts_with("actors[0]: ") && said.contains("bounds"), "{said}");
+    assert_eq!(refusal(&format!("{FLAT}{bounds}{}", fence.replace("64", "40"))), "accepted");
+}
