@@ -103,6 +103,11 @@ pub trait Actor: Send {
     /// Its bodies, in the order of [`ActorInfo::parts`]; never empty.
     fn bodies(&self) -> &[BodyId];
 
+    /// Those of its bodies that say where it is: an actor is lost when one of them leaves the arena's bounds.
+    fn whereabouts(&self) -> &[BodyId] {
+        self.bodies()
+    }
+
     /// What it knows from tick to tick beside its bodies' states, for whoever sets them to what they were.
     fn memory(&self) -> Memory {
         Memory::default()

@@ -208,6 +208,11 @@ impl Actor for Vehicle {
         &self.bodies
     }
 
+    /// Not its squash, which stays in the place where it was made.
+    fn whereabouts(&self) -> &[BodyId] {
+        self.rig.bodies()
+    }
+
     /// Pedals and steering, whether reset was held, time until it works again, gear and shift, stunts.
     fn memory(&self) -> Memory {
         let [throttle, brake, steer] = self.response.to_array();
@@ -261,13 +266,13 @@ impl Actor for Vehicle {
             squash.follow(step.world, &motion)?;
         }
         self.reset_if_asked(step, &motion)?;
+        // As it stands now: nothing else is done by how it lay.
+        let motion = Motion::of(step.world, chassis).ok_or(SimError::Gone { what: "the chassis" })?;
         let speed = motion.forward_speed();
         self.response.follow(&self.controls, &self.parameters, speed, step.dt);
         self.move_wheels(step, speed)?;
         self.drag(step, &motion)?;
         let footing = self.footing(step.world);
-        // As it stands now: nothing else is done by how it lay.
-        let motion = Motion::of(step.world, chassis).ok_or(SimError::Gone { what: "the chassis" })?;
         let (rig, parameters, controls) = (&self.rig, &self.parameters, &self.controls);
         let (world, dt, motion) = (&mut *step.world, step.dt, &motion);
         self.stunts.act(Stage { world, rig, parameters, controls, motion, footing, dt })?;

@@ -123,7 +123,8 @@ impl Arena {
 
     fn place_all(&mut self, file: &ArenaFile, recipes: &[Recipe]) -> Result<(), ArenaError> {
         for (i, recipe) in recipes.iter().enumerate() {
-            let ids = self.place_actors(file, i, recipe).map_err(refused(&Key::new("actors").index(i)))?;
+            let mut ids = Vec::new();
+            self.place_actors(file, i, recipe, &mut ids).map_err(refused(&Key::new("actors").index(i)))?;
             self.placed.actors.push(ids);
         }
         for i in 0..file.drivers.len() {

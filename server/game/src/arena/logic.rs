@@ -1,10 +1,10 @@
 //! Stage 3: actors come, act, are lost and go.
 
-use pita_sim::{DVec3, SimError, World};
+use pita_sim::{BodyId, DVec3, SimError, World};
 
 use super::{Arena, ArenaEvent};
 use crate::actor::{Actor, WhenLost};
-use crate::arena_file::ACTORS_MAX;
+use crate::arena_file::{ACTORS_MAX, BoundsFile};
 use crate::spawn::{self, Pose};
 use crate::step::{EFFECTS_MAX, KindLogic, LogicReport, Other, Request, Step};
 
@@ -26,12 +26,8 @@ impl Arena {
     /// Whom the world lost: an actor that left the bounds, or of which the engine took a body out of the world.
     fn find_lost(&mut self) {
         let Self { actors, world, bounds, lost, .. } = self;
-        let is_lost = |actor: &dyn Actor| {
-            actor.bodies().iter().any(|&body| {
-                let inside = world.position(body).is_some_and(|at| bounds.contains(at));
-                !inside || world.is_quarantined(body)
-            })
-        };
+        let is_broken = |&body: &BodyId| world.position(body).is_none() || world.is_quarantined(body);
+        let is_lost = |actor: &dyn Actor| !is_inside(world, bounds, actor) || actor.bodies().iter().any(is_broken);
         lost.extend(actors.iter().filter(|(_, actor)| is_lost(&***actor)).map(|(&id, _)| id));
     }
 
@@ -170,13 +166,7 @@ impl Arena {
         if self.actors.len() >= ACTORS_MAX {
             return Err(SimError::Unusable { what: "an arena has at most 16384 actors" });
         }
-        let before = self.world.body_count();
-        let actor = build(&mut self.world, id).inspect_err(|_| {
-            // What it added before it was refused: bodies are in the order in which they came.
-            while let Some(&body) = self.world.bodies().get(before) {
-                self.world.remove_body(body);
-            }
-        })?;
+        let actor = whole_or_nothing(&mut self.world, |world| build(world, id))?;
         self.add(actor);
         Ok(())
     }
@@ -185,9 +175,6 @@ impl Arena {
         let info = actor.describe().clone();
         self.owners.extend(actor.bodies().iter().map(|&body| (body, info.id)));
         self.actors.insert(info.id, actor);
-        if let Some(rounds) = &mut self.rounds {
-            rounds.forget(id);
-        }
         self.events.push(ArenaEvent::ActorAdded(info));
     }
 
@@ -197,6 +184,9 @@ impl Arena {
         for body in actor.bodies() {
             self.owners.remove(body);
             self.world.remove_body(*body);
+        }
+        if let Some(rounds) = &mut self.rounds {
+            rounds.forget(id);
         }
         self.events.push(ArenaEvent::ActorRemoved(id));
     }
@@ -208,4 +198,23 @@ impl Arena {
             others.filter_map(|(_, actor)| self.world.position(*actor.bodies().first()?)).collect();
         spawn::choose(&self.spawns, &places, self.bounds.max[1])
     }
+}
+
+/// What `build` adds. Where it is refused, no body stays behind that it had added before.
+pub(super) fn whole_or_nothing<T>(
+    world: &mut World,
+    build: impl FnOnce(&mut World) -> Result<T, SimError>,
+) -> Result<T, SimError> {
+    let before = world.body_count();
+    build(world).inspect_err(|_| {
+        // Bodies are in the order in which they came.
+        while let Some(&body) = world.bodies().get(before) {
+            world.remove_body(body);
+        }
+    })
+}
+
+/// Whether an actor is within the bounds.
+pub(super) fn is_inside(world: &World, bounds: &BoundsFile, actor: &dyn Actor) -> bool {
+    actor.whereabouts().iter().all(|&body| world.position(body).is_none_or(|at| bounds.contains(at)))
 }

@@ -3,6 +3,7 @@
 use pita_sim::{DVec3, SimError};
 
 use super::Arena;
+use super::logic::{is_inside, whole_or_nothing};
 use crate::arena_file::{ArenaFile, DriverFile};
 use crate::driver::AiDriver;
 use crate::kinds::{Recipe, Site};
@@ -10,6 +11,9 @@ use crate::spawn::Pose;
 
 /// Most bodies that the actors of a file may have: kinds multiply copies by bodies of their own.
 const BODIES_MAX: usize = 65_536;
+
+/// Why what would be lost at once is not placed.
+const OUTSIDE: SimError = SimError::Unusable { what: "a part of it is outside the arena's bounds" };
 
 /// Ids of what each table of the file placed.
 #[derive(Debug, Default)]
@@ -19,25 +23,30 @@ pub(super) struct Placed {
 }
 
 impl Arena {
-    /// Adds what `recipe` makes of the file's `index`-th actor and its copies; answers their ids.
+    /// Adds what `recipe` makes of the file's `index`-th actor and its copies, up to the first that is refused; their ids
+    /// go to the end of `ids`.
     pub(super) fn place_actors(
         &mut self,
         file: &ArenaFile,
         index: usize,
         recipe: &Recipe,
-    ) -> Result<Vec<u32>, SimError> {
+        ids: &mut Vec<u32>,
+    ) -> Result<(), SimError> {
         let actor = &file.actors[index];
-        let place = |position| {
+        for position in actor.block().places() {
             if self.world.body_count() >= BODIES_MAX {
                 return Err(SimError::Unusable { what: "the actors of an arena have at most 65536 bodies in all" });
             }
             let (id, pose) = (self.new_id(), Pose { position, yaw: actor.yaw.to_radians() });
-            let (world, materials, name) = (&mut self.world, &self.materials, actor.name());
-            let added = recipe(&mut Site { world, id, name, pose, file, materials })?;
+            let (materials, name) = (&self.materials, actor.name());
+            let added = whole_or_nothing(&mut self.world, |world| {
+                let added = recipe(&mut Site { world, id, name, pose, file, materials })?;
+                if is_inside(world, &file.bounds, &*added) { Ok(added) } else { Err(OUTSIDE) }
+            })?;
             self.add(added);
-            Ok(id)
-        };
-        actor.block().places().map(place).collect()
+            ids.push(id);
+        }
+        Ok(())
     }
 
     /// Adds the file's `index`-th car; answers its id.

@@ -102,9 +102,13 @@ impl Arena {
         let take = |of: &[Vec<u32>], kept: Option<usize>| kept.and_then(|old| of.get(old)).cloned();
         let mut placed = Placed::default();
         for (i, &kept) in actors.iter().enumerate() {
-            let ids = take(&old.actors, kept).map_or_else(|| self.place_actors(&file, i, &recipes[i]), Ok);
-            // Built before, in `Reload::between`: nothing is left to refuse.
-            placed.actors.push(ids.unwrap_or_default());
+            let ids = take(&old.actors, kept).unwrap_or_else(|| {
+                let mut ids = Vec::new();
+                // Built before, in `Reload::between`: refused only where players' cars leave no room for all.
+                let _refused = self.place_actors(&file, i, &recipes[i], &mut ids);
+                ids
+            });
+            placed.actors.push(ids);
         }
         for (i, &kept) in drivers.iter().enumerate() {
             let ids = take(&old.drivers, kept).map_or_else(|| self.place_driver(&file, i), Ok);

@@ -169,6 +169,11 @@ impl Actor for Tornado {
         &self.bodies
     }
 
+    /// Its foot: it may be higher than the world, and blow its dust out of it.
+    fn whereabouts(&self) -> &[BodyId] {
+        &self.bodies[..1]
+    }
+
     fn collide(&mut self, contact: &Contact) -> Response {
         let is_ground = matches!(contact.partner, Partner::Ground(_));
         if is_ground && contact.own.body == Some(self.column.foot()) {

@@ -1,6 +1,9 @@
 //! A running arena takes another text: what changes, what stays, and what is refused.
 
-use pita_game::{ActorKinds, Controls, Reload, ReloadError, Supplies};
+use pita_game::arena_file::{ArenaError, ArenaFile, Key};
+use pita_game::assembly::{Assembly, Piece};
+use pita_game::{Actor, ActorInfo, ActorKind, ActorKinds, Controls, Reload, ReloadError, Site, Supplies};
+use pita_sim::{BodyId, DVec3, Shape, SimError};
 
 use crate::test_track::{FLAT, SETTINGS, TestTrack};
 
@@ -96,4 +99,60 @@ fn new_cars_have_the_new_parameters() {
         track.arena.world().mass(track.arena.actor(id).expect("listed").bodies()[0])
     };
     assert_eq!((mass(0), mass(1)), (Some(1100.0), Some(2000.0)));
+}
+
+/// Cannot be added where there are more than six bodies.
+struct Shy(ActorInfo, Assembly);
+
+#[derive(serde::Deserialize)]
+struct Nothing {}
+
+impl ActorKind for Shy {
+    const KIND: &'static str = "shy";
+    type Parameters = Nothing;
+
+    fn check(_: &Nothing, _: &Key, _: &ArenaFile) -> Result<(), ArenaError> {
+        Ok(())
+    }
+
+    fn add(site: &mut Site, _: &Nothing) -> Result<Self, SimError> {
+        let mut ball = Assembly::at(site.pose);
+        ball.add(site.world, Piece::new(Shape::Ball { radius: 0.5 }, 1.0, 0.5, DVec3::Y))?;
+        if site.world.body_count() > 6 {
+            return Err(SimError::Unusable { what: "too many are here" });
+        }
+        Ok(Self(site.info(Self::KIND, ball.parts()), ball))
+    }
+}
+
+impl Actor for Shy {
+    fn describe(&self) -> &ActorInfo {
+        &self.0
+    }
+
+    fn bodies(&self) -> &[BodyId] {
+        self.1.bodies()
+    }
+}
+
+/// What can be built in an empty arena may be refused in a full one: nothing of it stays behind, and what was placed
+/// before it is still the table's.
+#[test]
+fn what_the_running_arena_refuses_leaves_nothing_behind() {
+    let kinds = ActorKinds::built_in().with::<Shy>();
+    let supplies = Supplies { kinds: &kinds, read: &|_| Err(String::new()) };
+    let new = format!(
+        "{FLAT}\n[[actors]]\nkind = \"shy\"\nposition = [40, 0, 40]\ncopies = [3, 1, 1]\nspacing = [2, 0, 0]\n"
+    );
+    let change =
+        |old: &str, new: &str| Reload::between(old, new, &SETTINGS, &supplies).unwrap_or_else(|e| panic!("{e}"));
+    let mut track = TestTrack::new(FLAT, SETTINGS);
+    track.enter(0);
+    track.tick();
+    track.arena.schedule(change(FLAT, &new));
+    track.tick();
+    assert_eq!((track.arena.actors().count(), track.arena.world().body_count()), (2, 6));
+    track.arena.schedule(change(&new, FLAT));
+    track.tick();
+    assert_eq!((track.arena.actors().count(), track.arena.world().body_count()), (1, 5));
 }

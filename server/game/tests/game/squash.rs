@@ -94,3 +94,20 @@ fn it_comes_and_goes_with_the_car() {
     track.tick();
     assert_eq!(track.arena.world().body_count(), 0);
 }
+
+/// A car is where its chassis and wheels are, wherever its squash was made.
+#[test]
+fn a_car_that_starts_outside_the_world_is_put_back_once() {
+    let bounds = "[bounds]\nmin = [-50.0, -20.0, -50.0]\nmax = [50.0, 80.0, 50.0]\n";
+    let route = "[routes.out]\ncorners = [[60.0, 0.0], [0.0, 0.0]]\n";
+    let driver = "[[drivers]]\nname = \"out\"\nroute = \"out\"\nspeed = 1.0\n";
+    let flat = FLAT.replace("count = [8, 8]", "count = [1, 1]");
+    let text = format!("{flat}{bounds}{route}{driver}[vehicle]\nsquash.strength = 1.0\n");
+    let mut track = TestTrack::new(&text, SETTINGS);
+    let mut lost = 0;
+    for _ in 0..30 {
+        track.tick();
+        lost += track.arena.logic().lost;
+    }
+    assert_eq!(lost, 1);
+}
