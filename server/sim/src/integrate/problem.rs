@@ -193,6 +193,8 @@ pub(crate) struct Problem {
     pub frames: Vec<Frame<f64>>,
     /// Where a solve of this tick ended; empty before. Numbers beyond a block's size are zero.
     pub(super) solution: Vec<[f64; BLOCK_RATES_MAX]>,
+    /// That solve parted bodies at speeds that they shall not keep.
+    pub(super) is_parting: bool,
     pub(super) products: ProductMemory,
 }
 
@@ -214,6 +216,7 @@ impl Problem {
         self.figures.clear();
         self.frames.clear();
         self.solution.clear();
+        self.is_parting = false;
     }
 
     /// Blocks of unknowns.
@@ -225,7 +228,9 @@ impl Problem {
     /// did; only an impact makes a difference that the first iteration does not mend, and what figures of parts do to
     /// themselves, at their joints' limits, is not seen from here.
     pub(super) fn guesses(&self) -> &'static [Guess] {
-        if !self.solution.is_empty() {
+        if self.is_parting {
+            &[Guess::Solution, Guess::Target, Guess::Before, Guess::Rest]
+        } else if !self.solution.is_empty() {
             &[Guess::Solution]
         } else if self.figures.have_parts() || self.terms.contacts.iter().any(ContactTerm::is_impact) {
             &[Guess::Repeated, Guess::Before, Guess::Target, Guess::Rest]

@@ -38,14 +38,15 @@ impl Integrator {
 }
 
 impl Solve {
-    /// Prepares the second solution, which goes on from where the first one ended. Answers whether one is wanted.
+    /// Prepares the second solution, which goes on from where the first one ended, unless bodies parted so fast there that
+    /// another start is nearer. Answers whether one is wanted.
     fn start_over_without_recovery(&mut self, scene: &Scene) -> bool {
         let contacts = &mut self.problem.terms.contacts;
         // Those after the first look's deepened in this tick, at speeds that bodies have.
         let is_deep = contacts.iter().take(self.contacts.len()).any(|contact| contact.recovers());
         if is_deep {
             contacts.iter_mut().for_each(|contact| contact.stop_recovery());
-            self.is_pending = true;
+            (self.is_pending, self.problem.is_parting) = (true, true);
         }
         is_deep && scene.settings.contact.recovery_speed > 0.0
     }

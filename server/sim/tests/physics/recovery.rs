@@ -53,6 +53,29 @@ fn crates_one_inside_another_part_and_keep_their_momentum() {
     assert!(apart.abs().max_element() > 0.995, "still inside: {apart}");
 }
 
+/// A dozen crates in one place, none quite like another: where one pushes the next, and what the tick itself brings about is
+/// looked at again, none keeps a speed, and they do not take longer than the deepest alone would.
+#[test]
+fn a_heap_in_one_place_parts_without_speed() {
+    let mut world = weightless();
+    let ids: Vec<_> = (0..12)
+        .map(|i| {
+            let i = f64::from(i);
+            let half = DVec3::new(0.3 + 0.02 * i, 0.5 - 0.02 * i, 0.4);
+            body(&mut world, Shape::Box { half }, 10.0 + i, DVec3::new(0.01 * i, -0.02 * i, 0.013 * i), 0.5)
+        })
+        .collect();
+    let mut fastest = 0.0f64;
+    for _ in 0..60 {
+        world.step();
+        fastest = ids.iter().map(|&id| world.velocity(id).unwrap().length()).fold(fastest, f64::max);
+    }
+    assert!(fastest < 1.0, "{fastest} m/s");
+    world.detect_collisions();
+    let deepest = world.contacts().map(|contact| -contact.gap).fold(0.0, f64::max);
+    assert!(deepest < 5e-3, "{deepest} m deep");
+}
+
 /// Two crates one inside another on the ground end at rest.
 #[test]
 fn crates_one_inside_another_end_at_rest_on_the_ground() {
