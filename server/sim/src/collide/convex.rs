@@ -78,8 +78,11 @@ impl Finder {
         self.clip(&pair, normal, normal_b, hints);
         out.normal = a.pose.rotation * normal;
         let sides = Sides { a, b, normal, margin };
+        // Along a normal that was turned it may be deeper than along its own: in a crack, where a triangle ends at another
+        // that faces it, the way out is beside it.
+        let deepest = gap - if is_turned { margin } else { DEEPER };
         let mut offer = |on_a: DVec3, on_b: DVec3, along: f64, feature: u32| {
-            if along >= gap - DEEPER {
+            if along >= deepest {
                 sides.offer([on_a, on_b], along, feature, out);
             }
         };

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use pita_sim::collide::TriangleMesh;
-use pita_sim::{Collider, DVec3, Shape, StaticDesc, World};
+use pita_sim::{Collider, DVec3, RigidBodyDesc, Settings, Shape, StaticDesc, World};
 
-use super::{body, world};
+use super::{DT, body, world};
 
 /// A square field of `cells` by `cells`, `spacing` wide each, with its middle at the origin.
 fn field(world: &mut World, cells: usize, spacing: f64, height: impl Fn(f64, f64) -> f64) {
@@ -101,4 +101,39 @@ fn hills_and_bowls_hold() {
         }
     }
     assert!(world.velocity(cube).unwrap().length() < 1e-3, "{}", world.velocity(cube).unwrap());
+}
+
+/// A pyramid stands on its tip in a crack and falls over along it. Beside the tip, where one wall ends at the other, the way
+/// out of a wall is along the other one: both have to hold it all the same.
+#[test]
+fn what_falls_over_in_a_crack_does_not_get_through_its_walls() {
+    let across = [(-1.0, 0.5), (-0.5, 0.5), (0.0, 0.0), (0.5, 0.5), (1.0, 0.5)];
+    let row = |z: f64| across.map(|(x, y)| DVec3::new(x, y, z));
+    let vertices = [row(-2.0), row(2.0)].concat();
+    let cells = (0..4u32).flat_map(|i| [[i, i + 5, i + 6], [i, i + 6, i + 1]]);
+    let crack = TriangleMesh::new(&vertices, &cells.collect::<Vec<_>>()).unwrap();
+    let corners = [(-0.5, 3.0, -0.5), (-0.5, 3.0, 0.5), (0.5, 3.0, -0.5), (0.5, 3.0, 0.5), (0.0, 0.0001, 0.0)];
+    let corners = corners.map(|(x, y, z)| DVec3::new(x, y, z));
+    let spike = Shape::Hull { points: corners.to_vec(), radius: 0.0 };
+    let mass = spike.mass_properties(pita_sim::mass::Density::constant(1000.0)).unwrap();
+    let (inertia, rotation) = mass.principal();
+    let points = corners.iter().map(|&corner| rotation.inverse() * (corner - mass.centre)).collect();
+    for dt in [0.01, 1.0 / 60.0, DT] {
+        let mut world = World::new(Settings { sleep: None, ..Settings::at(dt) }).unwrap();
+        world.add_static(StaticDesc::new(Collider::new(Shape::Mesh(Arc::new(crack.clone())), 0.0))).unwrap();
+        let shape = Shape::Hull { points: Vec::clone(&points), radius: 0.0 };
+        let desc = RigidBodyDesc::new(mass.centre, mass.mass, inertia);
+        let (collider, velocity) = (Some(Collider::new(shape, 0.0)), DVec3::X);
+        world.add_rigid_body(RigidBodyDesc { rotation, collider, velocity, ..desc }).unwrap();
+        let mut least = world.energy().total();
+        for tick in 0..(1.2 / dt) as u32 {
+            world.step();
+            let deepest = world.contacts().map(|contact| -contact.gap).fold(0.0, f64::max);
+            assert!(deepest < 0.015, "{deepest} m deep in tick {tick} of {dt} s");
+            let energy = world.energy().total();
+            let risen = (energy - least) / (mass.mass * 9.81);
+            assert!(risen < 0.01, "gains {risen} m in tick {tick} of {dt} s");
+            least = least.min(energy);
+        }
+    }
 }
