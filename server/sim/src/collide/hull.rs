@@ -1,17 +1,18 @@
 //! Hulls: colliders of bodies as detection keeps them from tick to tick.
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 use slotmap::SlotMap;
 
 use super::embedded_hull::{Deformed, Motion};
 use super::shape::{Collider, Shape};
 use super::{Bound, Moving};
-use crate::dof::{Body, BodyId, Placed, Pose, Twist};
+use crate::dof::{Body, BodyId, FigureBody, Placed, Pose, Twist};
 use crate::settings::Settings;
 use crate::state::State;
 
-/// How far off a straight line a tick may move what goes round, m.
-const STRAIGHT: f64 = 1e-3;
+/// Share of its bounding radius that a part of a figure moves by in a tick from where on it is asked what it passes: what is
+/// slower is stopped by what it passes at no more than that.
+const FAST: f64 = 0.1;
 
 /// Where detection looks bodies up.
 #[derive(Clone, Copy)]
@@ -55,14 +56,17 @@ pub(super) struct Hull {
     twist: Twist,
     /// How much faster than its twist says its surface may be, m/s.
     spread: f64,
-    /// Whether it goes on as its twist says as long as nothing touches it.
+    /// See [`Moving`].
     flies: bool,
+    pivot: DVec3,
+    bend: f64,
     /// Of the hull and of all that a tick may do to it; empty where the body takes no part.
     pub bounds: Bound,
     /// How the tick moves it, as far as the second look asks.
     pub stride: Stride,
-    /// What it is in this tick where its vertices are embedded.
+    /// What it is in this tick where its vertices are embedded, and where the solver wants to put it.
     deformed: Option<Box<Deformed>>,
+    ahead: Option<Box<(Deformed, Pose)>>,
 }
 
 /// Whether a tick moves a hull far.
@@ -76,8 +80,9 @@ pub(super) struct Stride {
 
 impl Hull {
     pub fn new(placed: Placed, owner: u32) -> Self {
-        let (pose, twist, spread, flies, bounds) = (Pose::IDENTITY, Twist::REST, 0.0, false, Bound::EMPTY);
-        Self { placed, owner, pose, twist, spread, flies, bounds, stride: Stride::default(), deformed: None }
+        let (pose, twist, spread, bounds) = (Pose::IDENTITY, Twist::REST, 0.0, Bound::EMPTY);
+        let (flies, pivot, bend, stride) = (false, DVec3::ZERO, 0.0, Stride::default());
+        Self { placed, owner, pose, twist, spread, flies, pivot, bend, bounds, stride, deformed: None, ahead: None }
     }
 
     /// Takes over where its body is now.
@@ -93,11 +98,23 @@ impl Hull {
                     deformed.follow(hull, figure, state);
             }
         }
-        // A piece of a compound goes round the centre of mass.
-        let lever = self.placed.at.point.length() * (settings.dt * self.twist.angular.length()).powi(2) / 2.0;
-        self.flies = body.figure.is_none() && lever < STRAIGHT;
+        self.foresee(bodies, body, settings);
         if let Some(collider) = self.collider(bodies) {
             self.bounds = swept_bounds(&self.seen(collider), settings);
+        }
+    }
+
+    /// Finds out how it goes on.
+    fn foresee(&mut self, bodies: Bodies, body: &Body, settings: &Settings) {
+        let Some(figure) = &body.figure else {
+            self.flies = true;
+            self.pivot = body.pose(bodies.state).position - self.pose.position;
+            return;
+        };
+        let radius = self.collider(bodies).map_or(0.0, Collider::bounding_radius);
+        self.flies = settings.dt * self.twist.linear.length() > FAST * radius;
+        if self.flies {
+            self.bend = self.spread + figure.bend(&self.placed, bodies.state.q(body.slice), radius, settings);
         }
     }
 
@@ -114,14 +131,29 @@ impl Hull {
         }
     }
 
+    /// Takes over where the solver wants to put its vertices, if they are embedded: positions and rates of the figure.
+    /// Answers how they move.
+    pub fn deform_ahead(&mut self, figure: &FigureBody, state: [&[f64]; 2]) -> Option<(Twist, f64)> {
+        let hull = figure.hull(self.placed.index)?;
+        let (deformed, pose) = &mut **self.ahead.get_or_insert_with(|| Box::new((Deformed::new(hull), Pose::IDENTITY)));
+        let motion = deformed.follow(hull, figure, state);
+        *pose = motion.pose;
+        Some((motion.twist, motion.spread))
+    }
+
+    /// What it collides with where the solver wants to put it, if its vertices are embedded, and where that is.
+    pub fn ahead(&self) -> Option<(&Collider, Pose)> {
+        self.ahead.as_ref().map(|ahead| (&ahead.0.collider, ahead.1))
+    }
+
     /// What the fine phase sees of it.
     pub fn moving<'a>(&'a self, bodies: Bodies<'a>) -> Option<Moving<'a>> {
         Some(self.seen(self.collider(bodies)?))
     }
 
     fn seen<'a>(&self, collider: &'a Collider) -> Moving<'a> {
-        let Self { placed: Placed { serial, .. }, owner, pose, twist, spread, flies, .. } = *self;
-        Moving { serial, owner, collider, pose, twist, spread, flies }
+        let Self { placed: Placed { serial, .. }, owner, pose, twist, spread, flies, pivot, bend, .. } = *self;
+        Moving { serial, owner, collider, pose, twist, spread, flies, pivot, bend }
     }
 }
 
@@ -152,7 +184,7 @@ fn swept_bounds(hull: &Moving, settings: &Settings) -> Bound {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{DQuat, DVec3};
+    use glam::DQuat;
 
     /// Along every direction a bound reaches as far as the shape: against the box that every shape has had all along.
     #[test]

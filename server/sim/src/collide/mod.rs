@@ -55,7 +55,7 @@ use kdop::Kdop;
 use manifold::ManifoldPoint;
 use material::MaterialTable;
 use narrow_phase::{Key, NarrowPhase};
-pub(crate) use second_look::{Candidates, SecondPoint};
+pub(crate) use second_look::{Candidates, Course, SecondPoint};
 use trees::Trees;
 
 slotmap::new_key_type! {
@@ -110,8 +110,12 @@ pub(crate) struct Moving<'a> {
     pub twist: Twist,
     /// How much faster than its twist says its surface may be where it deforms, m/s.
     pub spread: f64,
-    /// Whether it goes on as its twist says as long as nothing touches it.
+    /// Whether it goes on as its twist says, but for `bend`, as long as nothing touches it.
     pub flies: bool,
+    /// From its origin to what it goes round: its body's centre of mass, m.
+    pub pivot: DVec3,
+    /// How much faster than its twist says the end of the tick may find its surface, m/s: joints and muscles bend its way.
+    pub bend: f64,
 }
 
 /// The second half of a pair: another body or a piece of static geometry.
@@ -229,6 +233,8 @@ pub(crate) struct Detector {
     pub touched: Vec<BodyId>,
     /// Points that the second look of this tick added.
     pub second: Vec<SecondPoint>,
+    /// How wide those of earlier looks believe to be, m, in order of pair.
+    beliefs: Vec<(Key, f64)>,
     /// What there is to tell of pairs in this tick, in order of pair.
     touches: Vec<Touch>,
     /// Counts detections.

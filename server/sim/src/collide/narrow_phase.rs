@@ -12,7 +12,7 @@ use super::collision::{Closest, Meeting, Phase, Touch};
 use super::convex::{Finder, NAMELESS};
 use super::half_space;
 use super::manifold::{Manifold, ManifoldPoint, POINTS_MAX};
-use super::passing::{passes, spin_across};
+use super::passing::{Beside, Flyby, passes, spin_across};
 use super::patches::{PATCHES_MAX, Patches};
 use super::proximity::Proximity;
 use super::shape::{Collider, Shape};
@@ -101,6 +101,8 @@ pub(super) struct NarrowPhase {
     manifold: Manifold,
     passing: Manifold,
     patches: Patches,
+    /// Points of a pair that overlaps, with their normals.
+    overlapping: Vec<(DVec3, ManifoldPoint)>,
     /// Points of a pair's last tick that this tick has not taken over.
     old: Vec<ContactPoint>,
 }
@@ -147,7 +149,7 @@ impl NarrowPhase {
         self.last.sort_unstable_by_key(Known::key);
     }
 
-    /// Contacts of two bodies. Answers whether there are any that push.
+    /// Contacts of two bodies. Answers whether there are any that push within this tick.
     pub fn bodies(&mut self, a: &Moving, b: &Moving, surface: Surface, settings: &Settings) -> bool {
         let margin =
             margin((a.twist.linear - b.twist.linear).length(), reach(a, settings) + reach(b, settings), settings);
@@ -156,10 +158,14 @@ impl NarrowPhase {
         let pair = self.take(key, 0, a.collider.is_sensor() || b.collider.is_sensor(), settings);
         let deforms = a.spread > 0.0 || b.spread > 0.0;
         self.convex(pair, (a.collider, a.pose), (b.collider, b.pose), margin, deforms);
-        self.let_pass(a, Ok(b), settings);
-        self.update(key, pair, &Meeting { a, b: Some(b), surface }, settings);
+        self.let_pass(a, Beside::Moving(b), settings);
+        let meeting = Meeting { a, b: Some(b), surface };
+        self.update(key, pair, &meeting, settings);
+        // What turns may be nearer at the end of the tick than its points say.
+        let near = settings.contact.margin + reach(a, settings) + reach(b, settings);
+        let closes = |point: &ContactPoint| meeting.closes(point.position, point.normal, settings);
         let pair = &self.memory[pair];
-        !pair.is_sensor && !pair.points.is_empty()
+        !pair.is_sensor && pair.points.iter().any(|point| point.gap - closes(point) < near)
     }
 
     /// Contacts of a body with a piece of static geometry.
@@ -193,7 +199,9 @@ impl NarrowPhase {
         }
         let pair = self.take(key, 0, is_sensor, settings);
         self.convex(pair, (a.collider, a.pose), (piece, pose), margin, a.spread > 0.0);
-        self.let_pass(a, Err((piece, pose)), settings);
+        if let Some(piece) = piece.convex(pose) {
+            self.let_pass(a, Beside::Still(piece), settings);
+        }
         self.update(key, pair, &meeting, settings);
     }
 
@@ -266,16 +274,36 @@ impl NarrowPhase {
     /// The nearest points of two shapes; nothing is remembered of them.
     pub fn proximity(&mut self, a: (&Collider, Pose), b: (&Collider, Pose), margin: f64) -> Option<Proximity> {
         if let (Shape::Mesh(mesh), Some(convex)) = (b.0.shape(), a.0.convex(a.1)) {
-            self.patches.find((a.0.shape(), convex, a.1), (mesh, b.1), margin, &mut self.finder);
+            self.patches.find((a.0.shape(), convex, a.1), (mesh, b.1), margin, &mut self.finder, None);
             return self.patches.found().iter_mut().filter_map(nearest_of).min_by(|p, q| p.gap.total_cmp(&q.gap));
         }
         self.look(a, b, margin);
         nearest_of(&mut self.manifold)
     }
 
-    /// Where two colliders are within `margin` of one another; nothing is remembered of it. Answers the normal from the
-    /// first to the second, and points; none for surfaces of triangles.
-    pub fn look(&mut self, a: (&Collider, Pose), b: (&Collider, Pose), margin: f64) -> (DVec3, &[ManifoldPoint]) {
+    /// Where two colliders overlap: points with the normals from the first to the second; nothing is remembered of it.
+    /// `margin` says by how much more than is known what is in a crack may be, m.
+    pub fn overlap(&mut self, a: (&Collider, Pose), b: (&Collider, Pose), margin: f64) -> &[(DVec3, ManifoldPoint)] {
+        self.overlapping.clear();
+        if let (Shape::Mesh(mesh), Some(convex)) = (b.0.shape(), a.0.convex(a.1)) {
+            let Self { finder, patches, overlapping, .. } = self;
+            patches.find((a.0.shape(), convex, a.1), (mesh, b.1), margin, finder, None);
+            for patch in patches.found() {
+                let normal = patch.normal;
+                let deep = patch.reduced().iter().filter(|point| point.gap < 0.0);
+                overlapping.extend(deep.map(|&point| (normal, point)));
+            }
+        } else {
+            self.look(a, b, 0.0);
+            let normal = self.manifold.normal;
+            self.overlapping.extend(self.manifold.reduced().iter().map(|&point| (normal, point)));
+        }
+        &self.overlapping
+    }
+
+    /// Finds the manifold of two colliders within `margin` of one another; nothing else is remembered of it. There is none
+    /// of surfaces of triangles.
+    fn look(&mut self, a: (&Collider, Pose), b: (&Collider, Pose), margin: f64) {
         let Self { finder, manifold, .. } = self;
         manifold.clear();
         if let Shape::HalfSpace { normal } = b.0.shape() {
@@ -284,7 +312,6 @@ impl NarrowPhase {
         } else if let (Some(a), Some(b)) = (a.0.convex(a.1), b.0.convex(b.1)) {
             finder.contacts(a, b, margin, None, manifold);
         }
-        (manifold.normal, manifold.reduced())
     }
 
     /// Finds the manifold of two convex shapes, unless they kept still; `deforms` says that one has not kept its shape.
@@ -304,7 +331,7 @@ impl NarrowPhase {
     }
 
     /// Drops the points of what only passes.
-    fn let_pass(&mut self, a: &Moving, b: Result<&Moving, (&Collider, Pose)>, settings: &Settings) {
+    fn let_pass(&mut self, a: &Moving, b: Beside, settings: &Settings) {
         let Self { manifold, finder, passing, .. } = self;
         if !manifold.reduced().is_empty() && passes(a, b, manifold, finder, passing, settings) {
             manifold.clear();
@@ -335,7 +362,8 @@ impl NarrowPhase {
         let body = meeting.a;
         let Some(convex) = body.collider.convex(body.pose) else { return };
         let shape = (body.collider.shape(), convex, body.pose);
-        let count = self.patches.find(shape, (mesh, pose), margin, &mut self.finder).len();
+        let flyby = Flyby { body, settings, scratch: &mut self.passing };
+        let count = self.patches.find(shape, (mesh, pose), margin, &mut self.finder, Some(flyby)).len();
         for patch in places.len()..count {
             places.push(self.take(key, patch as u8, is_sensor, settings));
         }

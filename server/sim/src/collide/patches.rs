@@ -4,9 +4,11 @@
 use arrayvec::ArrayVec;
 use glam::DVec3;
 use parry3d_f64::math::Pose as ParryPose;
+use parry3d_f64::shape::Triangle;
 
 use super::convex::{Convex, Finder};
 use super::manifold::{Manifold, ManifoldPoint};
+use super::passing::Flyby;
 use super::shape::Shape;
 use super::triangle_mesh::TriangleMesh;
 use crate::dof::Pose;
@@ -31,6 +33,8 @@ const DIRECTIONS: u32 = 8;
 struct Candidate {
     point: ManifoldPoint,
     normal: DVec3,
+    /// It would stop what flies at its plane.
+    is_ahead: bool,
 }
 
 /// Points of a pair; keeps its memory from pair to pair.
@@ -42,13 +46,14 @@ pub(super) struct Patches {
 }
 
 impl Patches {
-    /// Finds the patches of a shape that are nearer than `margin` to a surface.
+    /// Finds the patches of a shape that are nearer than `margin` to a surface, without those of what it only passes.
     pub fn find(
         &mut self,
         (shape, body, at): (&Shape, Convex, Pose),
         (mesh, pose): (&TriangleMesh, Pose),
         margin: f64,
         finder: &mut Finder,
+        mut flyby: Option<Flyby>,
     ) -> &[Manifold] {
         self.candidates.clear();
         let to_mesh = pose.rotation.inverse();
@@ -58,13 +63,26 @@ impl Patches {
         let min = middle + DVec3::from_array(ends.map(|(low, _)| low)) - margin;
         let max = middle + DVec3::from_array(ends.map(|(_, high)| high)) + margin;
         let surface = ParryPose::from_parts(pose.position, pose.rotation);
+        let mut is_stopped = false;
         for (triangle, normals) in mesh.in_box(min, max) {
             let piece = Convex { core: &triangle, half: None, radius: 0.0, pose: surface, constraints: Some(&normals) };
             self.scratch.clear();
             finder.contacts(body, piece, margin, None, &mut self.scratch);
+            let is_ahead = flyby.as_ref().is_some_and(|flyby| flyby.stops(piece, &mut self.scratch));
+            is_stopped |= is_ahead;
             let normal = self.scratch.normal;
-            let points = self.scratch.reduced().iter().map(|&point| Candidate { point, normal });
+            let points = self.scratch.reduced().iter().map(|&point| Candidate { point, normal, is_ahead });
             self.candidates.extend(points.take(CANDIDATES_MAX - self.candidates.len()));
+        }
+        if let Some(flyby) = flyby.as_mut().filter(|_| is_stopped) {
+            let comes_to = |(triangle, _): (Triangle, _)| {
+                let piece = Convex { core: &triangle, half: None, radius: 0.0, pose: surface, constraints: None };
+                let outward = triangle.normal().map_or(DVec3::ZERO, |normal| pose.rotation * normal);
+                flyby.comes_to(piece, outward, finder)
+            };
+            if !mesh.in_box(min, max).any(comes_to) {
+                self.candidates.retain(|candidate| !candidate.is_ahead);
+            }
         }
         self.group();
         &self.found

@@ -10,10 +10,10 @@ use glam::DVec3;
 
 use super::hull::{Bodies, Hull, Stride};
 use super::material::MaterialTable;
-use super::narrow_phase::NarrowPhase;
+use super::narrow_phase::{Key, NarrowPhase};
 use super::shape::{Collider, Shape};
-use super::{ContactPoint, Detector, Partner};
-use crate::dof::{Pose, Twist};
+use super::{ContactPoint, Detector, EmbeddedHull, Foot, Partner};
+use crate::dof::{FigureBody, Pose, Twist};
 use crate::settings::Settings;
 
 /// A pair is looked at again where one side moves by more than this share of its bounding radius.
@@ -26,6 +26,8 @@ const DEEPER: f64 = 3e-3;
 #[derive(Clone, Debug)]
 pub(crate) struct SecondPoint {
     pub contact: ContactPoint,
+    /// Between which vertices it is, where they are embedded.
+    pub feet: [Option<Foot>; 2],
     /// From the origins of both sides to the point, at the candidate, m.
     pub arms: [DVec3; 2],
     /// What the gap is at the start of the tick if it is linear about the candidate, m.
@@ -34,47 +36,145 @@ pub(crate) struct SecondPoint {
     pub start_depth: f64,
 }
 
+/// Where the solver wants to put a body.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Course {
+    /// A particle or rigid body.
+    Body(Pose, Twist),
+    /// A figure: where its positions and rates begin among those of all.
+    Figure([usize; 2]),
+}
+
 /// Where the solver wants to put the bodies of a tick.
 pub(crate) struct Candidates<'a> {
     pub bodies: Bodies<'a>,
-    /// By the bodies' indices in the tick; none for figures, whose points move along arcs that a second point does not
-    /// know.
-    pub motions: &'a [Option<(Pose, Twist)>],
+    /// By the bodies' indices in the tick.
+    pub courses: &'a [Course],
+    /// Positions and rates of figures, one after the other.
+    pub rates: [&'a [f64]; 2],
 }
 
 /// One of a pair.
-#[derive(Clone, Copy)]
 struct Side<'a> {
     serial: u32,
     owner: u32,
     collider: &'a Collider,
     pose: Pose,
-    twist: Twist,
-    /// Centre of mass of its body, m, and how that moves.
+    carrier: Carrier<'a>,
+}
+
+/// What moves the points of a side.
+enum Carrier<'a> {
+    /// A frame, whose origin the tick brings here, m, and how it moves.
+    Frame(DVec3, Twist),
+    /// Vertices of a figure: its positions before and after, and its rates.
+    Vertices { figure: &'a FigureBody, hull: &'a EmbeddedHull, q: [&'a [f64]; 2], v: &'a [f64] },
+}
+
+/// What moves a point.
+struct Hold {
+    /// Where the tick brings what it is fixed to, m.
     origin: DVec3,
-    carrier: Twist,
+    twist: Twist,
+    foot: Option<Foot>,
 }
 
 impl<'a> Candidates<'a> {
-    fn side(&self, hull: &Hull) -> Option<Side<'a>> {
-        let index = self.bodies.bodies.get(hull.placed.body)?.index;
-        let (body, carrier) = (*self.motions.get(index as usize)?)?;
-        let (pose, twist) = hull.placed.carried(body, carrier);
-        let (serial, owner, collider) = (hull.placed.serial, hull.owner, self.bodies.collider(&hull.placed)?);
-        Some(Side { serial, owner, collider, pose, twist, origin: body.position, carrier })
+    /// Positions and rates that the solver wants a figure to have.
+    fn of_figure(&self, figure: &FigureBody, [q, v]: [usize; 2]) -> [&'a [f64]; 2] {
+        let [positions, rates] = self.rates;
+        let sizes = figure.dof.blocks().iter();
+        let [many, few] =
+            sizes.fold([0, 0], |[p, r], size| [p + usize::from(size.positions), r + usize::from(size.rates)]);
+        [&positions[q..q + many], &rates[v..v + few]]
     }
 
-    fn stride(&self, hull: &Hull, dt: f64) -> Stride {
-        let Some(Side { collider, pose, twist, .. }) = self.side(hull) else { return Stride::default() };
+    /// `None` for what takes no part, and where the solver lost its way.
+    fn side(&'a self, hull: &'a Hull, dt: f64) -> Option<Side<'a>> {
+        let placed = &hull.placed;
+        let body = self.bodies.bodies.get(placed.body)?;
+        let (serial, owner) = (placed.serial, hull.owner);
+        let collider = self.bodies.collider(placed)?;
+        let (collider, pose, carrier) = match (*self.courses.get(body.index as usize)?, &body.figure) {
+            (Course::Body(pose, twist), _) => {
+                (collider, placed.carried(pose, twist).0, Carrier::Frame(pose.position, twist))
+            }
+            (Course::Figure(start), Some(figure)) => {
+                let ([q, v], before) = (self.of_figure(figure, start), self.bodies.state.q(body.slice));
+                if let Some(hull_of_figure) = figure.hull(placed.index) {
+                    let (collider, pose) = hull.ahead()?;
+                    (collider, pose, Carrier::Vertices { figure, hull: hull_of_figure, q: [before, q], v })
+                } else {
+                    // Contacts keep the derivatives of the start.
+                    let start = figure.dof.frame(placed.at, before, v);
+                    let (origin, twist) = (DVec3::from(start.position), start.twist());
+                    let pose = figure.dof.frame(placed.at, q, v).pose();
+                    (collider, pose, Carrier::Frame(origin + dt * twist.linear, twist))
+                }
+            }
+            (Course::Figure(_), None) => return None,
+        };
+        let is_sane = pose.position.is_finite() && pose.rotation.is_finite();
+        is_sane.then_some(Side { serial, owner, collider, pose, carrier })
+    }
+
+    /// How the tick moves a hull.
+    fn stride(&self, hull: &mut Hull, dt: f64) -> Stride {
+        self.strides(hull, dt).unwrap_or_default()
+    }
+
+    fn strides(&self, hull: &mut Hull, dt: f64) -> Option<Stride> {
+        let placed = hull.placed;
+        let body = self.bodies.bodies.get(placed.body)?;
+        let collider = self.bodies.collider(&placed)?;
+        let mut radius = collider.bounding_radius();
+        let (rotation, twist, spread) = match (*self.courses.get(body.index as usize)?, &body.figure) {
+            (Course::Figure(start), Some(figure)) => {
+                let state = self.of_figure(figure, start);
+                if let Some((twist, spread)) = hull.deform_ahead(figure, state) {
+                    radius = hull.ahead()?.0.bounding_radius();
+                    (None, twist, spread)
+                } else {
+                    let frame = figure.dof.frame(placed.at, state[0], state[1]);
+                    (Some(frame.pose().rotation), frame.twist(), 0.0)
+                }
+            }
+            (Course::Body(pose, twist), None) => {
+                let (pose, twist) = placed.carried(pose, twist);
+                (Some(pose.rotation), twist, 0.0)
+            }
+            _ => return None,
+        };
         // A surface of revolution stays where it is however fast it spins about its axis.
-        let across = match (collider.shape(), collider.shape().revolution_axis()) {
+        let across = match (collider.shape(), rotation.zip(collider.shape().revolution_axis())) {
             (Shape::Ball { .. }, _) => DVec3::ZERO,
-            (_, Some(axis)) => twist.angular.reject_from_normalized(pose.rotation * axis),
+            (_, Some((rotation, axis))) => twist.angular.reject_from_normalized(rotation * axis),
             _ => twist.angular,
         };
-        let radius = collider.bounding_radius();
         let (turn, far) = (dt * across.length() * radius, MOVED * radius);
-        Stride { is_far: turn + dt * twist.linear.length() > far, turns_far: turn > far }
+        Some(Stride { is_far: turn + dt * (twist.linear.length() + spread) > far, turns_far: turn + dt * spread > far })
+    }
+}
+
+impl Side<'_> {
+    /// What moves a point of the surface at `position`, on the side towards `outward`, where the gap is so wide.
+    fn hold(&self, position: DVec3, outward: DVec3, gap: f64, dt: f64) -> Hold {
+        let (figure, hull, [before, after], v) = match self.carrier {
+            Carrier::Frame(origin, twist) => return Hold { origin, twist, foot: None },
+            Carrier::Vertices { figure, hull, q, v } => (figure, hull, q, v),
+        };
+        let core = position - outward * (gap / 2.0 + hull.radius());
+        let foot = hull.foot(core, outward, |at| figure.dof.point(at, after, v)[0]);
+        let (mut origin, mut twist) = (DVec3::ZERO, Twist::REST);
+        for &(at, weight) in foot.iter().filter(|(_, weight)| *weight > 0.0) {
+            // Contacts keep the derivatives of the start.
+            let frame = figure.dof.frame(at, before, v);
+            let moves = frame.twist();
+            origin += weight * (DVec3::from(frame.position) + dt * moves.linear);
+            twist =
+                Twist { linear: twist.linear + weight * moves.linear, angular: twist.angular + weight * moves.angular };
+        }
+        Hold { origin, twist, foot: Some(foot) }
     }
 }
 
@@ -87,14 +187,18 @@ impl Detector {
     /// Looks again at the pairs of the tick that move far, where `candidates` has them. Answers whether points were added
     /// to [`Detector::second`], where those of earlier looks stay.
     pub fn look_again(&mut self, candidates: &Candidates, settings: &Settings) -> bool {
-        let Self { trees, excluded, materials, statics, unbounded, contacts, second, narrow_phase, .. } = self;
-        let known = second.len();
-        let mut look = Look { contacts, second, narrow_phase, dt: settings.dt };
+        let Self { trees, excluded, materials, statics, unbounded, contacts, second, narrow_phase, beliefs, .. } = self;
+        let (known, dt) = (second.len(), settings.dt);
+        beliefs.clear();
+        beliefs.extend(second.iter().map(|SecondPoint { contact, .. }| ((contact.a, contact.b), contact.believed_gap)));
+        beliefs.sort_unstable_by_key(|&(key, _)| key);
+        let mut look = Look { contacts, second, beliefs, narrow_phase, settings };
         let excludes = |a: u32, b: u32| excluded.binary_search(&(a.min(b), a.max(b))).is_ok();
         for pair in trees.pairs_awake().filter(|pair| pair.iter().any(|hull| hull.stride.is_far)) {
-            let [Some(a), Some(b)] = pair.map(|hull| candidates.side(hull)) else { continue };
+            let [Some(a), Some(b)] = pair.map(|hull| candidates.side(hull, dt)) else { continue };
             if !excludes(a.owner, b.owner) {
-                look.at_pair(a, b, Partner::Body(b.serial), materials);
+                let partner = Partner::Body(b.serial);
+                look.at_pair([a, b], partner, materials);
             }
         }
         let unbounded = trees.awake().flat_map(|hull| unbounded.iter().map(move |&id| (hull, id)));
@@ -105,11 +209,11 @@ impl Detector {
             if !(if is_flat { hull.stride.turns_far } else { hull.stride.is_far }) {
                 continue;
             }
-            let Some(a) = candidates.side(hull) else { continue };
+            let Some(a) = candidates.side(hull, dt) else { continue };
             let (serial, collider, pose) = (piece.serial, &piece.collider, piece.pose);
-            let (origin, twist) = (pose.position, Twist::REST);
-            let b = Side { serial, owner: serial, collider, pose, twist, origin, carrier: twist };
-            look.at_pair(a, b, Partner::Static(serial), materials);
+            let carrier = Carrier::Frame(pose.position, Twist::REST);
+            let b = Side { serial, owner: serial, collider, pose, carrier };
+            look.at_pair([a, b], Partner::Static(serial), materials);
         }
         second.len() > known
     }
@@ -119,13 +223,15 @@ impl Detector {
 struct Look<'a> {
     contacts: &'a [ContactPoint],
     second: &'a mut Vec<SecondPoint>,
+    /// How wide the points of earlier looks believe to be, m, in order of pair.
+    beliefs: &'a [(Key, f64)],
     narrow_phase: &'a mut NarrowPhase,
-    dt: f64,
+    settings: &'a Settings,
 }
 
 impl Look<'_> {
     /// Adds the points of a pair, if it is deeper than its points believe.
-    fn at_pair(&mut self, a: Side, b: Side, partner: Partner, materials: &MaterialTable) {
+    fn at_pair(&mut self, [a, b]: [Side; 2], partner: Partner, materials: &MaterialTable) {
         let pushes = a.collider.meets(b.collider) && !a.collider.is_sensor() && !b.collider.is_sensor();
         let key = (a.serial, partner);
         let start = self.contacts.partition_point(|contact| (contact.a, contact.b) < key);
@@ -133,24 +239,29 @@ impl Look<'_> {
         if !pushes || points().any(|contact| contact.is_cancelled) {
             return;
         }
-        let added = self.second.iter().map(|point| &point.contact).filter(|contact| (contact.a, contact.b) == key);
-        let believed = points().chain(added).map(|contact| contact.believed_gap).fold(0.0, f64::min);
-        let (normal, found) = self.narrow_phase.look((a.collider, a.pose), (b.collider, b.pose), 0.0);
-        if found.iter().all(|point| point.gap >= believed - DEEPER) {
+        let added = &self.beliefs[self.beliefs.partition_point(|&(other, _)| other < key)..];
+        let added = added.iter().take_while(|(other, _)| *other == key).map(|&(_, gap)| gap);
+        let believed = points().map(|contact| contact.believed_gap).chain(added).fold(0.0, f64::min);
+        let found = self.narrow_phase.overlap((a.collider, a.pose), (b.collider, b.pose), self.settings.contact.margin);
+        if found.iter().all(|(_, point)| point.gap >= believed - DEEPER) {
             return;
         }
+        let dt = self.settings.dt;
         let start_depth = -points().map(|contact| contact.gap).fold(0.0, f64::min);
         let surface = materials.contact(a.collider.material(), b.collider.material());
         let partner_moves = matches!(partner, Partner::Body(_));
-        for point in found {
+        for (normal, point) in found {
+            let hold = |side: &Side, outward: DVec3| side.hold(point.position, outward, point.gap, dt);
+            let [of_a, of_b] = [hold(&a, *normal), hold(&b, -normal)];
             // Momentum turns about where the bodies were at the start of the tick: a force on both at one point conserves
             // it only if the arms differ as they did then. What they have moved since is shared.
-            let moved = if partner_moves { self.dt * (b.carrier.linear - a.carrier.linear) } else { DVec3::ZERO };
-            let arms = [a.origin + moved / 2.0, b.origin - moved / 2.0];
-            let arms = arms.map(|origin| point.position - origin);
-            let moved = self.dt * (b.carrier.at(arms[1]) - a.carrier.at(arms[0]));
-            let contact = ContactPoint::fresh(key, normal, point, surface);
-            self.second.push(SecondPoint { contact, arms, start_gap: point.gap - moved.dot(normal), start_depth });
+            let moved = dt * (of_b.twist.linear - of_a.twist.linear);
+            let moved = if partner_moves { moved } else { DVec3::ZERO };
+            let arms = [of_a.origin + moved / 2.0, of_b.origin - moved / 2.0].map(|origin| point.position - origin);
+            let moved = dt * (of_b.twist.at(arms[1]) - of_a.twist.at(arms[0]));
+            let (contact, start_gap) =
+                (ContactPoint::fresh(key, *normal, point, surface), point.gap - moved.dot(*normal));
+            self.second.push(SecondPoint { contact, feet: [of_a.foot, of_b.foot], arms, start_gap, start_depth });
         }
     }
 }

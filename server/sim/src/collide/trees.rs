@@ -256,7 +256,7 @@ impl Trees {
     }
 
     /// Tells every hull that is awake how the tick moves it. Answers whether one moves far.
-    pub fn set_strides(&mut self, stride: impl Fn(&Hull) -> Stride) -> bool {
+    pub fn set_strides(&mut self, stride: impl Fn(&mut Hull) -> Stride) -> bool {
         let mut any = false;
         for &key in &self.awake {
             let hull = &mut self.entries[key as usize].hull;

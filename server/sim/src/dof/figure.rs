@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::Motion;
 use super::interface::{BLOCK_RATES_MAX, Dof, Inertia, LocalState, PartPoint};
+use super::{Motion, Placed};
 use crate::collide::{Collider, EmbeddedHull};
 use crate::elimination::minimum_degree;
 use crate::error::{LARGEST, SimError, require, require_vector};
 use crate::integrate::figure::part_momentum;
 use crate::potential::hold::Memory;
+use crate::settings::Settings;
 
 /// A body of a general kind to be added.
 pub struct FigureDesc {
@@ -126,6 +127,22 @@ impl FigureBody {
     /// The embedded hull with this index among what the figure collides with.
     pub fn hull(&self, index: u32) -> Option<&EmbeddedHull> {
         self.hulls.get((index as usize).checked_sub(self.colliders.len())?)
+    }
+
+    /// How much a tick like the last one changes the velocity of a collider's surface beyond what gravity does, m/s; the
+    /// surface reaches `radius` from the collider's origin.
+    pub fn bend(&self, placed: &Placed, q: &[f64], radius: f64, settings: &Settings) -> f64 {
+        let fall = settings.gravity * settings.dt;
+        match self.hull(placed.index) {
+            None => {
+                let change = self.dof.frame(placed.at, q, &self.change).twist();
+                (change.linear - fall).length() + change.angular.length() * radius
+            }
+            Some(hull) => {
+                let changes = hull.vertices().iter().map(|&at| self.dof.point(at, q, &self.change)[1]);
+                changes.map(|change| (change - fall).length()).fold(0.0, f64::max)
+            }
+        }
     }
 
     /// Pulls at a material point with `force`, N, in the coming tick. What it does to each rate is that of where the figure

@@ -6,7 +6,7 @@ use super::attachment::{Follows, trace};
 use super::problem::{Rates, Unknown};
 use super::step::{Integrator, Scene, Solve};
 use super::wheels;
-use crate::collide::{ContactPoint, Foot, Partner, Surface};
+use crate::collide::{ContactPoint, Foot, Partner, SecondPoint, Surface};
 use crate::dof::{ABSENT, BLOCK_RATES_MAX, BodyId, FigureBody, Frame, Inertia, Node, PartPoint, Placed, Twist};
 use crate::island::Islands;
 use crate::potential::ball_joint::BallJointTerm;
@@ -82,7 +82,7 @@ impl Integrator {
         figures.for_each(|(index, _)| self.islands.touch(index));
         let contacts = scene.contacts.chunk_by(ContactPoint::same_pair).map(|points| contact_spots(scene, &points[0]));
         let anchors = scene.potentials.pairs().map(|[a, b]| Some([spot(scene, a)?, spot(scene, b)?]));
-        let second = scene.second.iter().map(|point| contact_spots(scene, &point.contact));
+        let second = scene.second.iter().map(|point| second_spots(scene, point));
         for spots in contacts.chain(second).chain(anchors).flatten() {
             match spots.map(Spot::body) {
                 [Some(a), Some(b)] => self.islands.couple(a, b),
@@ -230,7 +230,7 @@ impl Integrator {
     /// Points of the second look. They come after all contacts.
     fn gather_second(&mut self, scene: &Scene) {
         for (point, source) in scene.second.iter().zip(0..) {
-            let Some(spots) = contact_spots(scene, &point.contact) else { continue };
+            let Some(spots) = second_spots(scene, point) else { continue };
             let Some((solve, ends)) = self.localise(spots, Follows::Start) else { continue };
             let (frames, mass) = (ends.map(|end| end.frame), solve.reduced_mass(ends));
             let arm = |i: usize| if solve.turns(ends[i]) { point.arms[i] } else { DVec3::ZERO };
@@ -407,10 +407,19 @@ fn spot(scene: &Scene, anchor: Anchor) -> Option<Spot> {
 /// Where a contact acts: at the frames of the two colliders, or between the vertices of one that is embedded; nowhere if
 /// logic lets the pair pass.
 pub(super) fn contact_spots(scene: &Scene, contact: &ContactPoint) -> Option<[Spot; 2]> {
+    spots(scene, contact, [None; 2])
+}
+
+/// The same for a point of the second look, which knows its vertices.
+pub(super) fn second_spots(scene: &Scene, point: &SecondPoint) -> Option<[Spot; 2]> {
+    spots(scene, &point.contact, point.feet)
+}
+
+fn spots(scene: &Scene, contact: &ContactPoint, feet: [Option<Foot>; 2]) -> Option<[Spot; 2]> {
     if contact.is_cancelled {
         return None;
     }
-    let spot = |serial: u32, outward: DVec3| {
+    let spot = |serial: u32, outward: DVec3, foot: Option<Foot>| {
         let &Placed { body, at, index, .. } = placed(scene, serial)?;
         let body = &scene.bodies[body];
         let hull = body.figure.as_ref().and_then(|figure| Some((figure, figure.hull(index)?)));
@@ -419,16 +428,17 @@ pub(super) fn contact_spots(scene: &Scene, contact: &ContactPoint) -> Option<[Sp
             Some((figure, hull)) => {
                 let (q, v) = (scene.state.q(body.slice), scene.state.v(body.slice));
                 let core = contact.position - outward * (contact.gap / 2.0 + hull.radius());
-                Spot::Vertices(body.index, hull.foot(core, outward, |at| figure.dof.point(at, q, v)[0]))
+                let find = || hull.foot(core, outward, |at| figure.dof.point(at, q, v)[0]);
+                Spot::Vertices(body.index, foot.unwrap_or_else(find))
             }
         };
         (body.index != ABSENT).then_some(spot)
     };
     let b = match contact.b {
-        Partner::Body(serial) => spot(serial, -contact.normal)?,
+        Partner::Body(serial) => spot(serial, -contact.normal, feet[1])?,
         Partner::Static(_) => Spot::World,
     };
-    Some([spot(contact.a, contact.normal)?, b])
+    Some([spot(contact.a, contact.normal, feet[0])?, b])
 }
 
 /// A collider by its serial.

@@ -1,17 +1,19 @@
 //! Solving on after the second look: islands are found anew with its points. What they touch is gathered again and goes on
 //! from where it was, what they do not touch is taken over as it is.
 
-use super::gather::{Spot, contact_spots};
+use super::gather::{Spot, second_spots};
 use super::solver::SolveReport;
 use super::step::{Integrator, Scene, Solve};
-use crate::collide::Detector;
-use crate::dof::{Pose, Twist};
+use crate::collide::{Bodies, Candidates, Course, Detector};
 
 /// Memory of solving on.
 #[derive(Default)]
 pub(super) struct Onward {
     /// Where the solver wants to put bodies, by their index in the tick.
-    motions: Vec<Option<(Pose, Twist)>>,
+    courses: Vec<Course>,
+    /// Positions and rates of figures.
+    positions: Vec<f64>,
+    rates: Vec<f64>,
     /// Whether new points act on a body, by its index in the tick.
     touched: Vec<bool>,
     /// Island of each body before.
@@ -23,27 +25,37 @@ pub(super) struct Onward {
 }
 
 impl Integrator {
-    /// Where the solver wants to put particles and rigid bodies, by their index in the tick.
+    /// Where the solver wants to put bodies, by their index in the tick.
     pub fn find_candidates(&mut self, scene: &Scene) {
         let Self { onward, active, islands, solves, .. } = self;
-        onward.motions.clear();
-        onward.motions.extend((0..).zip(active.iter()).map(|(index, active)| {
+        let Onward { courses, positions, rates, .. } = onward;
+        courses.clear();
+        positions.clear();
+        rates.clear();
+        courses.extend((0..).zip(active.iter()).map(|(index, active)| {
             let body = &scene.bodies[active.id];
+            let solve = solves.get(islands.island_of(index) as usize);
             if body.figure.is_some() {
-                return None;
+                let start = [positions.len(), rates.len()];
+                let figure = solve.and_then(|solve| solve.problem.figures.list().get(active.figure as usize));
+                // A figure is always in an island.
+                positions.extend_from_slice(figure.map_or(scene.state.q(body.slice), |figure| &figure.q1));
+                rates.extend_from_slice(figure.map_or(scene.state.v(body.slice), |figure| &figure.v1));
+                return Course::Figure(start);
             }
-            if let Some(solve) = solves.get(islands.island_of(index) as usize) {
+            if let Some(solve) = solve {
                 let frame = &solve.problem.frames[active.start as usize];
-                return Some((frame.pose(), frame.twist()));
+                return Course::Body(frame.pose(), frame.twist());
             }
             let node = body.node(scene.state, scene.settings.dt, scene.settings.field());
-            Some((node.pose(node.target, scene.settings.dt), node.target))
+            Course::Body(node.pose(node.target, scene.settings.dt), node.target)
         }));
     }
 
     /// What [`Integrator::find_candidates`] found.
-    pub fn candidates(&self) -> &[Option<(Pose, Twist)>] {
-        &self.onward.motions
+    pub fn candidates<'a>(&'a self, bodies: Bodies<'a>) -> Candidates<'a> {
+        let Onward { courses, positions, rates, .. } = &self.onward;
+        Candidates { bodies, courses, rates: [positions, rates] }
     }
 
     /// Tells all contact points how wide their linear models believe them to be at the candidate.
@@ -66,7 +78,7 @@ impl Integrator {
         onward.touched.clear();
         onward.touched.resize(active.len(), false);
         for point in &scene.second[first..] {
-            for index in contact_spots(scene, &point.contact).into_iter().flatten().filter_map(Spot::body) {
+            for index in second_spots(scene, point).into_iter().flatten().filter_map(Spot::body) {
                 onward.touched[index as usize] = true;
             }
         }

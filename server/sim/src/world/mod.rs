@@ -13,7 +13,7 @@ mod state;
 
 use slotmap::SlotMap;
 
-use crate::collide::{Bodies, Candidates, Detector};
+use crate::collide::{Bodies, Detector};
 use crate::dof::{Body, BodyId, Placed};
 use crate::error::SimError;
 use crate::integrate::{Integrator, Scene, StepReport};
@@ -110,7 +110,7 @@ impl World {
             let (integrator, scene) = self.scene();
             integrator.find_candidates(&scene);
             let bodies = Bodies { bodies: &self.bodies, state: &self.state };
-            let candidates = Candidates { bodies, motions: self.integrator.candidates() };
+            let candidates = self.integrator.candidates(bodies);
             if !self.detector.find_strides(&candidates, &self.settings) {
                 break;
             }

@@ -15,13 +15,13 @@ use super::{DT, body, ground, weightless, world};
 const RADIUS: f64 = 0.02;
 
 /// A block of rubber of 1 × 0.6 × 0.6 m, its frame's origin amid its foot.
-fn jelly(young: f64, cells: [u32; 3]) -> FiniteElements {
+pub fn jelly(young: f64, cells: [u32; 3]) -> FiniteElements {
     let mesh = TetrahedralMesh::of_box(DVec3::new(-0.5, 0.0, -0.3), DVec3::new(0.5, 0.6, 0.3), cells).unwrap();
     let material = Elastic::new(young, 0.3).unwrap();
     FiniteElements::new(&mesh, material, Density::constant(200.0), &[]).unwrap().damped(0.02).unwrap()
 }
 
-fn add_jelly(world: &mut World, body: FiniteElements, position: DVec3, rotation: DQuat) -> BodyId {
+pub fn add_jelly(world: &mut World, body: FiniteElements, position: DVec3, rotation: DQuat) -> BodyId {
     let hulls = body.surface_hulls(RADIUS, 0.5);
     let (q, v) = (body.placed(position, rotation), body.still());
     let desc = FigureDesc { dof: Arc::new(body), q, v, colliders: Vec::new() };

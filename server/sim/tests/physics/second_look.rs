@@ -1,7 +1,12 @@
 //! What a tick itself brings about is seen within the tick.
 
-use pita_sim::{BodyId, DVec3, World};
+use std::sync::Arc;
 
+use pita_sim::collide::TriangleMesh;
+use pita_sim::{BodyId, Collider, DQuat, DVec3, Shape, StaticDesc, World};
+
+use super::sheep::{PARTS, Poses, add_articulated, coordinates};
+use super::sheep_forms::add_natural;
 use super::{cube, ground, world};
 
 /// Deepest overlap that detection finds at the end of any of so many ticks, m.
@@ -33,16 +38,62 @@ fn what_follows_another_down_does_not_end_inside_it() {
     assert!(deepest < 0.005, "{deepest} m deep");
 }
 
+/// Sheep do not either, nor jellies: points of theirs that the tick brings together are found where it brings them.
+#[test]
+fn sheep_and_jellies_that_follow_another_down_do_not_end_inside_it() {
+    type Add = fn(&mut World, DVec3) -> BodyId;
+    let kinds: [(&str, Add, f64, f64); 3] = [
+        ("natural", |world, at| add_natural(world, &poses_at(at), true), 1.35, 0.015),
+        ("articulated", |world, at| add_articulated(world, coordinates(&poses_at(at)), true), 1.35, 0.015),
+        ("jelly", |world, at| add_stiff_jelly(world, at - DVec3::Y * 0.3), 0.74, 0.02),
+    ];
+    for (name, add, spacing, limit) in kinds {
+        let mut world = world();
+        ground(&mut world);
+        for height in [2.0, 2.0 + spacing] {
+            let id = add(&mut world, DVec3::Y * height);
+            let slice = world.slice(id).unwrap();
+            let (q, mut v) = (slice.q.to_vec(), slice.v.to_vec());
+            let moving = if name == "articulated" { 3 } else { v.len() };
+            v[..moving].chunks_exact_mut(3).for_each(|v| v[1] = -8.0);
+            world.set_slice(id, &q, &v).unwrap();
+        }
+        let deepest = deepest(&mut world, 30);
+        assert!(deepest < limit, "{name}: {deepest} m deep");
+    }
+}
+
+fn poses_at(at: DVec3) -> Poses {
+    std::array::from_fn(|i| (at + PARTS[i].centre, DQuat::IDENTITY))
+}
+
+fn add_stiff_jelly(world: &mut World, at: DVec3) -> BodyId {
+    super::embedded_hulls::add_jelly(world, super::embedded_hulls::jelly(1e6, [2, 1, 1]), at, DQuat::IDENTITY)
+}
+
+/// A floor of triangles.
+fn surface(world: &mut World) {
+    let flat = TriangleMesh::of_height_field(&[0.0; 25], 5, 4.0).unwrap();
+    let collider = Collider::new(Shape::Mesh(Arc::new(flat)), 0.5);
+    world.add_static(StaticDesc { position: DVec3::new(-8.0, 0.0, -8.0), ..StaticDesc::new(collider) }).unwrap();
+}
+
 /// Crates that are thrown at one another and spin by a third of a radian a tick hit with corners that were not near
 /// anything when the tick began.
 #[test]
 fn corners_that_swing_in_are_seen() {
-    let mut world = world();
-    ground(&mut world);
-    for (i, side) in (0..6).zip([-1.0, 1.0].into_iter().cycle()) {
-        let id = cube(&mut world, DVec3::new(-1.5 * side, 1.0 + 0.6 * f64::from(i), 0.3 * f64::from(i)));
-        spin(&mut world, id, DVec3::new(10.0 * side, -5.0, 0.0), DVec3::new(4.0, 3.0 * side, 9.0));
+    for floor in [ground, surface] {
+        let mut world = world();
+        floor(&mut world);
+        throw_crates(&mut world);
+        let deepest = deepest(&mut world, 45);
+        assert!(deepest < 0.005, "{deepest} m deep");
     }
-    let deepest = deepest(&mut world, 45);
-    assert!(deepest < 0.005, "{deepest} m deep");
+}
+
+fn throw_crates(world: &mut World) {
+    for (i, side) in (0..6).zip([-1.0, 1.0].into_iter().cycle()) {
+        let id = cube(world, DVec3::new(-1.5 * side, 1.0 + 0.6 * f64::from(i), 0.3 * f64::from(i)));
+        spin(world, id, DVec3::new(10.0 * side, -5.0, 0.0), DVec3::new(4.0, 3.0 * side, 9.0));
+    }
 }

@@ -57,7 +57,7 @@ fn colliders_of_parts() -> Vec<PartCollider> {
 }
 
 /// Adds the sheep in natural coordinates with its parts at `poses`, whose joints are closed.
-fn add_natural(world: &mut World, poses: &Poses, colliders: bool) -> BodyId {
+pub fn add_natural(world: &mut World, poses: &Poses, colliders: bool) -> BodyId {
     let dof = natural();
     let mut q = vec![0.0; 39];
     for (i, (position, rotation)) in poses.iter().enumerate() {
