@@ -1,7 +1,7 @@
 //! Card house: three levels, fifteen cards of 2.5 × 1.25 m at 65°.
 //!
 //! The authors' cards are surfaces without thickness; ours are extruded by 5 mm. Theirs start with gaps, so that the house
-//! drops by up to 0.23 m and has to catch itself; here it is also set up without gaps.
+//! drops, its top by 0.33 m, and has to catch itself; here it is also set up without gaps.
 
 use pita_sim::{BodyId, DQuat, DVec3, Shape, SimError};
 
@@ -15,6 +15,9 @@ const FRICTION: f64 = 0.5;
 const HALF: [f64; 2] = [1.25, 0.625];
 const RADIUS: f64 = 5e-3;
 const LEAN: f64 = 65.0;
+
+/// How much lower than that of a house without gaps the top of one that stands may be, m.
+const LOWER_MAX: f64 = 0.3;
 
 /// How far a card of a house that stands may end from where it settled in the first second, m.
 const SHIFT_MAX: f64 = 0.01;
@@ -42,10 +45,13 @@ pub(super) fn run(dt: f64) -> Result<Vec<Finding>, SimError> {
         first: half_height + RADIUS,
         tilt: 0.0,
     };
-    Ok(vec![house(dt, &touching, "card house, set up")?, house(dt, &published, "card house, dropped")?])
+    // Both come to the same height: gaps close.
+    let top = touching.first + f64::from(LEVELS - 1) * touching.level;
+    Ok(vec![house(dt, &touching, top, "card house, set up")?, house(dt, &published, top, "card house, dropped")?])
 }
 
-fn house(dt: f64, plan: &Plan, name: &str) -> Result<Finding, SimError> {
+/// `closed_top` is the height of the middle of the highest cards once all gaps are closed, m.
+fn house(dt: f64, plan: &Plan, closed_top: f64, name: &str) -> Result<Finding, SimError> {
     let mut stage = Stage::new(dt)?;
     stage.ground(FRICTION)?;
     let mut cards = Vec::new();
@@ -68,8 +74,7 @@ fn house(dt: f64, plan: &Plan, name: &str) -> Result<Finding, SimError> {
     let moved = cards.iter().zip(settled).map(|(&card, from)| stage.position(card).distance(from));
     let shift = moved.fold(0.0, f64::max);
     let top = cards.iter().map(|&card| stage.position(card).y).fold(0.0, f64::max);
-    let top_wanted = plan.first + f64::from(LEVELS - 1) * plan.level - 0.3;
-    let stands = top > top_wanted;
+    let stands = top > closed_top - LOWER_MAX;
     Ok(Finding {
         scene: name.to_owned(),
         ours: format!("{}, shifts {:.2} mm", if stands { "stands" } else { "falls" }, 1e3 * shift),
