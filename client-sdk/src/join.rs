@@ -132,7 +132,7 @@ async fn predictor(
     // What is of a game's own kind is what the car looks like, no part of its motion.
     let moves = |part: &&PartDescription| part.mount != Mount::Own;
     let slices = own.ok_or(ClientError::NoActor)?.parts.iter().filter(moves).map(|part| part.slice).collect();
-    Predictor::new(&source.toml, accepted.tick_hz, slices).map_err(ClientError::Arena)
+    Predictor::new(&source, accepted.tick_hz, slices).map_err(ClientError::Arena)
 }
 
 fn share(wanted: &SessionBuilder, accepted: &JoinAccepted) -> Shared {

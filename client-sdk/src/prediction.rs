@@ -11,7 +11,7 @@ use glam::{DQuat, DVec3};
 use pita_game::{ArenaSettings, BodyState, CarState, Controls as GameControls, Rehearsal};
 use pita_protocol::{
     dof::{Group, Slice, kind},
-    message::Controls,
+    message::{ArenaSource, Controls},
 };
 
 /// Ticks that are kept: more than any lead; a prediction further ahead than that begins anew.
@@ -52,13 +52,18 @@ struct Predicted {
 }
 
 impl Predictor {
-    /// Of the car whose bodies have `slices`, in the arena that `toml` describes.
+    /// Of the car whose bodies have `slices`, in the arena of `source`.
     ///
     /// # Errors
     /// Text that says what is wrong with the arena.
-    pub fn new(toml: &str, tick_hz: u16, slices: Vec<u32>) -> Result<Self, String> {
+    pub fn new(source: &ArenaSource, tick_hz: u16, slices: Vec<u32>) -> Result<Self, String> {
         let settings = ArenaSettings { tick_hz, threads: 1 };
-        let rehearsal = Rehearsal::from_toml(toml, &settings).map_err(|error| error.to_string())?;
+        let read = |name: &str| {
+            let found = source.files.iter().find(|file| file.name == name);
+            found.map(|file| file.content.clone()).ok_or_else(|| "the server did not send it".to_owned())
+        };
+        let rehearsal = Rehearsal::from_toml_with(&source.toml, &settings, read);
+        let rehearsal = rehearsal.map_err(|error| error.to_string())?;
         let period_s = 1.0 / f64::from(tick_hz);
         Ok(Self { rehearsal, slices, period_s, past: VecDeque::new(), offset: DVec3::ZERO, turn: DQuat::IDENTITY })
     }
@@ -240,7 +245,8 @@ mod tests {
     const SLICES: [u32; 5] = [10, 11, 12, 13, 14];
 
     fn predictor() -> Predictor {
-        Predictor::new(pita_game::Arena::DEFAULT, 30, SLICES.to_vec()).unwrap()
+        let source = ArenaSource { toml: pita_game::Arena::DEFAULT.to_owned(), files: Vec::new() };
+        Predictor::new(&source, 30, SLICES.to_vec()).unwrap()
     }
 
     fn controls(tick: u64) -> Controls {
@@ -274,6 +280,24 @@ mod tests {
         assert_eq!(shown.iter().map(|slice| slice.id).collect::<Vec<_>>(), SLICES);
         assert!((f64::from(shown[0].q[0]) - real[150][0].position.x).abs() < 0.02);
         assert!(predictor.past.len() < 10);
+    }
+
+    /// Ground that is a mesh: without its file there is no prediction, with it the car stands on it.
+    #[test]
+    fn meshes_come_with_the_arena() {
+        use pita_protocol::message::SourceFile;
+        let toml = "name = \"hill\"\ntitle = \"Hill\"\nmax_players = 2\n[materials.rock]\nfriction = 1.0\n\
+                    [[statics]]\nmesh = \"hill.obj\"\nmaterial = \"rock\"\n[[spawns]]\nposition = [0.0, 5.0, 0.0]\n";
+        let mut source = ArenaSource { toml: toml.to_owned(), files: Vec::new() };
+        let missing = Predictor::new(&source, 30, SLICES.to_vec()).unwrap_err();
+        assert!(missing.contains("hill.obj") && missing.contains("did not send it"), "{missing}");
+        let hill = "v -50 5 -50\nv 50 5 -50\nv 50 5 50\nv -50 5 50\nf 1 4 3\nf 1 3 2\n";
+        source.files.push(SourceFile { name: "hill.obj".to_owned(), content: hill.into() });
+        let mut predictor = Predictor::new(&source, 30, SLICES.to_vec()).unwrap();
+        predictor.reconcile(0, predictor.rehearsal.state().bodies);
+        (1..=30).for_each(|tick| predictor.drive(tick, &Controls::default()));
+        let height = predictor.at(30.0).unwrap()[0].q[1];
+        assert!((5.3..5.8).contains(&height), "{height}");
     }
 
     #[test]

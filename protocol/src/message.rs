@@ -302,13 +302,32 @@ impl Message for EventMessage {
 pub struct ArenaSource {
     /// TOML, as the server read it.
     pub toml: String,
+    /// The meshes that it names, at most [`SOURCE_FILES_MAX`]; none of them where they are more than 1.5 MiB.
+    pub files: Vec<SourceFile>,
+}
+
+/// Most files of an [`ArenaSource`].
+pub const SOURCE_FILES_MAX: usize = 256;
+
+/// Most bytes of all of them.
+pub const SOURCE_FILES_BYTES_MAX: usize = 3 << 19;
+
+/// A file beside an arena's.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SourceFile {
+    /// As the arena's file names it, at most 128 bytes.
+    pub name: String,
+    /// What is in it.
+    #[serde(with = "bytes")]
+    pub content: Vec<u8>,
 }
 
 impl Message for ArenaSource {
     const KIND: u8 = 10;
-    const MAX_BYTES: usize = 1 << 20;
+    const MAX_BYTES: usize = 3 << 20;
     fn validate(&self) -> Result<(), WireError> {
-        Ok(())
+        require(self.files.len() <= SOURCE_FILES_MAX, "files", "at most 256")?;
+        require(self.files.iter().all(|file| file.name.len() <= 128), "name of a file", "at most 128 bytes")
     }
 }
 

@@ -8,8 +8,9 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use pita_game::arena_file::{self, FILE_MAX};
+use pita_game::arena_file::{self, ArenaFile, FILE_MAX};
 use pita_game::{ActorKinds, Arena, ArenaError, ArenaSettings, Reload, ReloadError, Supplies};
+use pita_protocol::message::{ArenaSource, SOURCE_FILES_BYTES_MAX, SOURCE_FILES_MAX, SourceFile};
 use pita_sim::geometry::FILE_MAX as GEOMETRY_MAX;
 
 /// Names and texts of the compiled-in arenas; the first is the default.
@@ -56,7 +57,7 @@ pub struct ArenaText {
     label: String,
     /// TOML.
     pub text: String,
-    /// Where its meshes are; nowhere for what is compiled in.
+    /// Where its meshes are; those of what is compiled in are so too.
     folder: Option<PathBuf>,
 }
 
@@ -109,10 +110,34 @@ impl ArenaText {
             .map_err(|reason| SourceError::Unchangeable { file: self.label.clone(), reason })
     }
 
+    /// What clients need to predict their own cars: the text, and its meshes unless they are too much to send.
+    pub fn source(&self) -> ArenaSource {
+        let files = self.meshes().unwrap_or_else(|reason| {
+            tracing::warn!("{}: clients cannot predict their cars: {reason}", self.label);
+            Vec::new()
+        });
+        ArenaSource { toml: self.text.clone(), files }
+    }
+
+    fn meshes(&self) -> Result<Vec<SourceFile>, String> {
+        let file = ArenaFile::parse(&self.text).map_err(|reason| reason.to_string())?;
+        let names = file.mesh_names();
+        let read = |name: &&str| Ok(SourceFile { name: (*name).to_owned(), content: self.read(name)? });
+        let files = names.iter().map(read).collect::<Result<Vec<_>, String>>()?;
+        let bytes: usize = files.iter().map(|file| file.content.len()).sum();
+        match files.len() <= SOURCE_FILES_MAX && bytes <= SOURCE_FILES_BYTES_MAX {
+            true => Ok(files),
+            false => Err(format!(
+                "{} meshes of {bytes} bytes in all, at most {SOURCE_FILES_MAX} of {SOURCE_FILES_BYTES_MAX} are sent",
+                files.len()
+            )),
+        }
+    }
+
     fn read(&self, name: &str) -> Result<Vec<u8>, String> {
         match &self.folder {
             Some(folder) => read_beside(folder, name).map_err(|reason| reason.to_string()),
-            None => Err("a built-in arena has no folder".to_owned()),
+            None => arena_file::shipped_file(name),
         }
     }
 

@@ -118,15 +118,15 @@ fn configure(args: &RunArgs) -> Result<Configured, DaemonError> {
     let arena = text.build(&settings)?;
     let secret_file = Some(&config.admin.secret_file).filter(|file| !file.as_os_str().is_empty());
     let doorkeeper = Doorkeeper::new(secret_file.map(|file| admin::read_secret(file)).transpose()?);
-    Ok(Configured { config, arena, source: text.text, doorkeeper })
+    Ok(Configured { config, arena, source: text.source(), doorkeeper })
 }
 
 /// What is to run.
 struct Configured {
     config: ServerConfig,
     arena: Arena,
-    /// Text of the arena.
-    source: String,
+    /// Text of the arena, and its meshes.
+    source: ArenaSource,
     doorkeeper: Doorkeeper,
 }
 
@@ -148,7 +148,7 @@ fn run_arena(configured: Configured, clock: Clock, out: &Output) -> Result<(), D
     })
 }
 
-fn share(config: &ServerConfig, arena: &Arena, source: String, clock: Clock) -> Result<Shared, DaemonError> {
+fn share(config: &ServerConfig, arena: &Arena, source: ArenaSource, clock: Clock) -> Result<Shared, DaemonError> {
     let name_error = |reason| DaemonError::ArenaName { name: arena.name().to_owned(), reason };
     let limits = config.sessions;
     let description = description::describe(arena, config.precision.into());
@@ -174,7 +174,7 @@ fn share(config: &ServerConfig, arena: &Arena, source: String, clock: Clock) -> 
             &config.bans.names,
         ),
         description,
-        source: ArenaSource { toml: source },
+        source,
     }))
 }
 

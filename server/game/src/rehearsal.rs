@@ -6,7 +6,7 @@
 use glam::{DQuat, DVec3};
 
 use crate::arena::{Arena, ArenaSettings, Command};
-use crate::arena_file::ArenaError;
+use crate::arena_file::{ArenaError, shipped_file};
 use crate::controls::Controls;
 use crate::pipeline::{self, Ports, Stage};
 
@@ -49,7 +49,19 @@ impl Rehearsal {
     /// # Errors
     /// Any [`ArenaError`].
     pub fn from_toml(text: &str, settings: &ArenaSettings) -> Result<Self, ArenaError> {
-        let mut arena = Arena::without_actors(text, settings)?;
+        Self::from_toml_with(text, settings, shipped_file)
+    }
+
+    /// The same, its meshes read by `read`, which answers the bytes of a file or why there are none.
+    ///
+    /// # Errors
+    /// Any [`ArenaError`].
+    pub fn from_toml_with(
+        text: &str,
+        settings: &ArenaSettings,
+        read: impl Fn(&str) -> Result<Vec<u8>, String>,
+    ) -> Result<Self, ArenaError> {
+        let mut arena = Arena::without_actors(text, settings, read)?;
         arena.apply(Command::Enter { slot: SLOT, name: String::new() });
         Ok(Self { arena })
     }

@@ -4,7 +4,6 @@
 
 use pita_game::ArenaSettings;
 use pita_protocol::admin::{AdminAction, AdminReply};
-use pita_protocol::message::ArenaSource;
 use zenoh::Wait;
 
 use crate::admin::Order;
@@ -47,6 +46,6 @@ fn change(config: &ServerConfig, shared: &Shared) -> Result<Vec<String>, SourceE
         return Ok(vec!["nothing changed: earlier changes still wait for a tick; ask again".to_owned()]);
     }
     // Whoever joins now may get the new text a tick before the new arena, which predicts his car no worse.
-    shared.set_source(ArenaSource { toml: new.text });
+    shared.set_source(new.source());
     Ok(changes)
 }

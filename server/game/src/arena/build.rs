@@ -9,7 +9,7 @@ use super::cast::Cast;
 use super::placing::Placed;
 use super::rounds::Rounds;
 use super::{Arena, ArenaSettings, StaticInfo};
-use crate::arena_file::{ArenaError, ArenaFile, Key, Materials};
+use crate::arena_file::{ArenaError, ArenaFile, Key, Materials, shipped_file};
 use crate::kinds::{ActorKinds, Recipe};
 use crate::spawn::Pose;
 use crate::step::LogicReport;
@@ -24,13 +24,12 @@ pub struct Supplies<'a> {
 }
 
 impl Arena {
-    /// Builds the arena that `text`, TOML, describes, of what comes with the game; it cannot have meshes.
+    /// Builds the arena that `text`, TOML, describes, of what comes with the game: its kinds of actors, and its meshes.
     ///
     /// # Errors
     /// Any [`ArenaError`]; it names the key, its value and what is allowed.
     pub fn from_toml(text: &str, settings: &ArenaSettings) -> Result<Self, ArenaError> {
-        let supplies =
-            Supplies { kinds: &ActorKinds::built_in(), read: &|_| Err("this arena has no folder".to_owned()) };
+        let supplies = Supplies { kinds: &ActorKinds::built_in(), read: &shipped_file };
         Self::from_toml_with(text, settings, &supplies)
     }
 

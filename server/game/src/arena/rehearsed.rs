@@ -6,9 +6,14 @@ use crate::kinds::ActorKinds;
 use crate::rehearsal::{BodyState, Memory};
 
 impl Arena {
-    /// The arena that `text` describes, without actors, drivers and combat.
-    pub(crate) fn without_actors(text: &str, settings: &ArenaSettings) -> Result<Self, ArenaError> {
+    /// The arena that `text` describes, without actors, drivers and combat, its meshes read by `read`.
+    pub(crate) fn without_actors(
+        text: &str,
+        settings: &ArenaSettings,
+        read: impl Fn(&str) -> Result<Vec<u8>, String>,
+    ) -> Result<Self, ArenaError> {
         let mut file = ArenaFile::parse(text)?;
+        file.read_meshes(read)?;
         file.actors.clear();
         file.drivers.clear();
         (file.ai, file.combat) = (None, None);

@@ -1,5 +1,6 @@
 //! Meshes of an arena: files beside its own, read through the caller.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use pita_sim::geometry::Geometry;
@@ -13,6 +14,11 @@ const TRIANGLES_MAX: usize = 16_384;
 const NAME_MAX: usize = 128;
 
 impl ArenaFile {
+    /// Names of the files that its statics are made of, each once.
+    pub fn mesh_names(&self) -> BTreeSet<&str> {
+        self.statics.iter().filter_map(|piece| piece.mesh.as_deref()).collect()
+    }
+
     /// Reads the meshes of statics. `read` answers the bytes of a file in the folder of the arena's file, or why not.
     ///
     /// # Errors

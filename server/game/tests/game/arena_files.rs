@@ -268,7 +268,7 @@ fn statics_may_be_meshes() {
         let error = load(mesh).err().unwrap_or_default();
         assert!(error.contains(expected), "{error}, expected: {expected}");
     }
-    assert!(refusal(&with("level/square.obj")).contains("this arena has no folder"));
+    assert!(refusal(&with("level/square.obj")).contains("no file of this name comes with the game"));
     let both = with("a.obj").replacen("mesh =", "shape.half_space = {}\nmesh =", 1);
     assert!(refusal(&both).contains("either shape or mesh"), "{}", refusal(&both));
 }

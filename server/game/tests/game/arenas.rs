@@ -1,8 +1,9 @@
 //! The arenas that ship live by themselves: nothing leaves them, nothing bursts, and the same run gives the same bits.
 
 use pita_game::{Arena, ArenaSettings, arena_file, pipeline};
+use pita_sim::DVec3;
 
-use crate::test_track::{Recorder, SETTINGS};
+use crate::test_track::{FULL_BRAKE, Recorder, SETTINGS, TestTrack};
 
 /// Every arena that the server has built in, and the flat one of the tests.
 const ARENAS: [(&str, &str); 5] = [
@@ -20,12 +21,14 @@ const FASTEST: f64 = 60.0;
 fn run(name: &str, text: &str, seconds: usize, settings: &ArenaSettings) -> u64 {
     let mut arena = Arena::from_toml(text, settings).unwrap_or_else(|error| panic!("{name}: {error}"));
     arena.audit_energy();
+    let mut gained = 0.0f64;
     let mut ports = Recorder::default();
     for tick in 0..seconds * usize::from(settings.tick_hz) {
         pipeline::tick(&mut arena, &mut ports);
         ports = Recorder::default();
         let world = arena.world();
         assert_eq!(world.report().quarantined, 0, "{name}, tick {tick}");
+        gained = gained.max(world.report().energy_gain);
         assert!(!world.report().is_energy_burst(), "{name}, tick {tick}: {:?}", world.report());
         for actor in arena.actors() {
             let bodies = arena.actor(actor.id).expect("listed above").bodies();
@@ -35,6 +38,7 @@ fn run(name: &str, text: &str, seconds: usize, settings: &ArenaSettings) -> u64 
         }
         assert_eq!(arena.logic().lost, 0, "{name}, tick {tick}: something left the arena");
     }
+    println!("{name}: {gained:.1} J from nowhere in a tick at most");
     arena.world().state_hash()
 }
 
@@ -76,6 +80,19 @@ fn ten_minutes_of_the_sheep_pasture() {
 #[ignore = "takes minutes"]
 fn ten_minutes_of_the_stress_arena() {
     ten_minutes_of(3);
+}
+
+/// The town's rock is a mesh: cars stand on it.
+#[test]
+fn the_towns_rock_bears_a_car() {
+    let (_, town) = ARENAS[1];
+    let town =
+        town.replace("[[spawn_grids]]\ncount = [10, 13]\nspacing = [8.0, 6.0]", "[[spawns]]\nposition = [72, 3, -38]");
+    let mut track = TestTrack::new(&town.replace("drivers = 6", "drivers = 0"), SETTINGS);
+    track.enter(0);
+    track.run(3.0, FULL_BRAKE);
+    let at = track.car(0).position;
+    assert!((1.5..2.4).contains(&at.y) && at.with_y(0.0).distance(DVec3::new(72.0, 0.0, -38.0)) < 2.0, "{at}");
 }
 
 #[test]

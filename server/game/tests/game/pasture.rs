@@ -13,6 +13,33 @@ fn slices(track: &TestTrack, kind: &str) -> BTreeSet<u32> {
     track.arena.actors().filter(|actor| actor.kind == kind).map(|actor| actor.parts[0].slice).collect()
 }
 
+/// With a single sheep, which is not what this is about.
+#[test]
+fn cars_and_crates_fly_and_come_down() {
+    let mut track = TestTrack::new(&PASTURE.replace("copies = [8, 1, 5]", "copies = [1, 1, 1]"), SETTINGS);
+    for kind in ["vehicle", "crate"] {
+        let all = slices(&track, kind);
+        assert!(all.len() >= 2, "{} of {kind}", all.len());
+        let (mut flown, mut landed) = (BTreeSet::new(), BTreeSet::new());
+        for _ in 0..300 * 30 {
+            track.tick();
+            for slice in track.arena.world().slices().filter(|slice| all.contains(&slice.serial)) {
+                let height = slice.q[1];
+                assert!(height > 0.0 && height < 30.0, "a {kind} at {height} m");
+                if height > 5.0 {
+                    flown.insert(slice.serial);
+                } else if height < 1.5 && flown.contains(&slice.serial) {
+                    landed.insert(slice.serial);
+                }
+            }
+            if !landed.is_empty() && flown == landed {
+                break;
+            }
+        }
+        assert!(!landed.is_empty() && flown == landed, "{kind}: {flown:?} flew, {landed:?} came down");
+    }
+}
+
 #[test]
 fn sheep_fly_and_come_down() {
     let mut track = TestTrack::new(PASTURE, SETTINGS);

@@ -80,7 +80,7 @@ fn those_who_fill_places_come_anew() {
     track.tick();
     let after = own(&track);
     assert!(after.len() == 1 && !before.contains(&after[0]), "{before:?}, then {after:?}");
-    track.run(12.0, Controls::default());
+    track.run(20.0, Controls::default());
     let at = track.arena.world().position(track.arena.actor(after[0]).expect("it drives").bodies()[0]).unwrap();
     assert!((at.z - 40.0).abs() < 12.0, "it follows the new route: {at}");
 }
