@@ -85,6 +85,8 @@ impl Integrator {
         let second = scene.second.iter().map(|point| second_spots(scene, point));
         for spots in contacts.chain(second).chain(anchors).flatten() {
             match spots.map(Spot::body) {
+                // A loop within a figure couples what is coupled anyway.
+                [Some(a), Some(b)] if a == b => self.islands.touch(a),
                 [Some(a), Some(b)] => self.islands.couple(a, b),
                 [Some(a), None] | [None, Some(a)] => self.islands.touch(a),
                 [None, None] => {}

@@ -18,7 +18,8 @@ impl World {
     /// Adds a spring with a damper.
     ///
     /// # Errors
-    /// [`SimError`] for a value out of range, a body that is gone, or two ends at the same body.
+    /// [`SimError`] for a value out of range, a body that is gone, or two ends at the same body; parts of one figure may be
+    /// its two ends.
     pub fn add_spring(&mut self, desc: SpringDesc) -> Result<SpringId, SimError> {
         desc.validate()?;
         self.check_anchors(desc.a, desc.b)?;
@@ -195,8 +196,18 @@ impl World {
                 "the index of one of the body's parts",
             )?;
         }
-        if a.body == b.body {
+        if a.body == b.body { self.check_loop(a, b) } else { Ok(()) }
+    }
+
+    /// What closes a loop within a figure, or spans what deforms, has its ends at two points that can come closer.
+    fn check_loop(&self, a: Anchor, b: Anchor) -> Result<(), SimError> {
+        let body = a.body.map(|id| &self.bodies[id]).filter(|body| body.figure.is_some());
+        let Some(body) = body else {
             return Err(SimError::Unusable { what: "both ends are at the same body" });
+        };
+        let deforms = matches!(body.kind, DofKind::FiniteElements | DofKind::Lattice);
+        if a == b || a.part == b.part && !deforms {
+            return Err(SimError::Unusable { what: "both ends are at the same part of a figure" });
         }
         Ok(())
     }

@@ -19,6 +19,7 @@ mod fine_phase;
 mod hostile;
 mod joints;
 mod lattice;
+mod loops;
 mod natural;
 mod near_misses;
 mod over_determined;

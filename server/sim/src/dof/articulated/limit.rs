@@ -137,16 +137,20 @@ impl JointLimit {
     }
 
     /// Energy, slope and curvature at a depth beyond a bound.
-    fn wall(&self, start: &Start, before: f64, now: f64) -> [f64; 3] {
+    fn wall<S: Scalar>(&self, start: &Start, before: f64, now: S) -> [S; 3] {
         let depth = now - (before - RECOVERY * self.tolerance).max(0.0);
-        if depth <= 0.0 {
-            return [0.0; 3];
+        if depth.below(f64::MIN_POSITIVE) {
+            return [S::ZERO; 3];
         }
         let half = self.tolerance / 2.0;
         let stiffness =
             start.inertia / (start.dt * start.dt) * (start.speed * start.dt / half).clamp(STIFFNESS, STIFFEST);
-        let (soft, hard) = (spring(depth, stiffness), spring((depth - half).max(0.0), HARDENING * stiffness));
-        std::array::from_fn(|i| soft[i] + if depth > half { hard[i] } else { 0.0 })
+        let soft = spring(depth, stiffness);
+        if depth.below(half) {
+            return soft;
+        }
+        let hard = spring(depth - half, HARDENING * stiffness);
+        [soft[0] + hard[0], soft[1] + hard[1], soft[2] + hard[2]]
     }
 }
 
@@ -163,8 +167,8 @@ pub(super) struct Start {
     pub turn: DVec3,
 }
 
-fn spring(depth: f64, stiffness: f64) -> [f64; 3] {
-    [0.5 * stiffness * depth * depth, stiffness * depth, stiffness]
+fn spring<S: Scalar>(depth: S, stiffness: f64) -> [S; 3] {
+    [depth * depth * (0.5 * stiffness), depth * stiffness, S::from(stiffness)]
 }
 
 /// How far an axis has swung, and the derivative with respect to the turn.
@@ -207,6 +211,26 @@ mod tests {
     fn variables(turn: DVec3) -> Vec3<Dual<3>> {
         let [x, y, z] = [0, 1, 2].map(|i| Dual::variable(turn[i], i));
         Vec3 { x, y, z }
+    }
+
+    proptest! {
+        /// Slope and curvature of a limit, as written, are those by automatic differentiation and by differences.
+        #[test]
+        fn walls_derive(now in -0.1..0.1f64, before in -0.2..0.2f64, speed in 0.0..100.0f64) {
+            let limit = JointLimit::range(0.0, 1.0);
+            let start = Start { dt: 1.0 / 30.0, inertia: 2.0, speed, turn: DVec3::ZERO };
+            let at = |now: f64| limit.wall(&start, before, Dual::<1>::variable(now, 0));
+            let [energy, slope, curvature] = at(now);
+            let largest = STIFFEST * HARDENING * start.inertia / (start.dt * start.dt);
+            prop_assert!((energy.tangent[0] - slope.value).abs() <= 1e-12 * largest);
+            prop_assert!((slope.tangent[0] - curvature.value).abs() <= 1e-12 * largest);
+            let h = 1e-6;
+            let (above, below) = (at(now + h), at(now - h));
+            let kink = above[2].value != below[2].value;
+            let difference = |i: usize| (above[i].value - below[i].value) / (2.0 * h);
+            prop_assert!((difference(0) - slope.value).abs() <= 1e-6 * (curvature.value + above[2].value));
+            prop_assert!(kink || (difference(1) - curvature.value).abs() <= 1e-6 * curvature.value);
+        }
     }
 
     proptest! {

@@ -186,3 +186,41 @@ pub(super) struct Driven<'a> {
 fn out_of_range(max_force: f64) -> SimError {
     SimError::OutOfRange { what: "max_force of the motor", value: max_force, allowed: "0 or more" }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::autodiff::Dual;
+
+    fn vector() -> impl Strategy<Value = DVec3> {
+        prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from_array)
+    }
+
+    proptest! {
+        /// The derivatives of a ball joint's spring, as written, are those by automatic differentiation of its energy and
+        /// by differences; and so are its second derivatives.
+        #[test]
+        fn springs_of_ball_joints_derive(start in vector(), turn in vector()) {
+            let start = DQuat::from_scaled_axis(start * 1.5);
+            let at = |turn: DVec3| {
+                let [x, y, z] = [0, 1, 2].map(|i| Dual::<3>::variable(turn[i], i));
+                half_square(&Turning::new(start, Vec3 { x, y, z }))
+            };
+            let (value, gradient) = at(turn);
+            // Off half a turn, where the shorter way round changes.
+            prop_assume!(value.value < 4.0);
+            let automatic = DVec3::from_array(value.tangent);
+            prop_assert!((automatic - gradient.value()).length() < 1e-9, "{automatic} {}", gradient.value());
+            let (_, _, hessian) = differentiate(turn, |turn| half_square(&Turning::new(start, turn)));
+            for (i, axis) in DVec3::AXES.into_iter().enumerate() {
+                let h = 1e-6;
+                let (above, below) = (at(turn + axis * h), at(turn - axis * h));
+                prop_assert!(((above.0.value - below.0.value) / (2.0 * h) - automatic[i]).abs() < 1e-7);
+                let column = (above.1.value() - below.1.value()) / (2.0 * h);
+                prop_assert!((column - hessian.col(i)).length() < 1e-6, "{column} {}", hessian.col(i));
+            }
+        }
+    }
+}
