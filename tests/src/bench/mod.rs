@@ -69,6 +69,8 @@ pub struct Options {
     pub rounds: Option<u32>,
     /// Where `solvers` draws what it found.
     pub plot: Option<PathBuf>,
+    /// Markdown document in which `solvers` replaces its section.
+    pub document: Option<PathBuf>,
 }
 
 /// Why an entry could not measure, for a person.

@@ -46,6 +46,10 @@ struct Arguments {
     /// SVG that `solvers` draws
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+
+    /// Markdown document in which `solvers` replaces what stands between its two comment lines
+    #[arg(long, value_name = "FILE")]
+    document: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
@@ -61,6 +65,7 @@ fn main() -> ExitCode {
         scenes: arguments.scenes,
         rounds: arguments.rounds,
         plot: arguments.plot,
+        document: arguments.document,
     };
     match run(&arguments.names, &options, arguments.json) {
         Ok(()) => ExitCode::SUCCESS,

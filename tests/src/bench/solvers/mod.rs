@@ -5,6 +5,7 @@
 //! it has reached, so that they solve the same systems, and what a bad one does to the world is not the others' trouble.
 
 mod contenders;
+mod document;
 mod plot;
 mod report;
 mod subjects;
@@ -41,7 +42,7 @@ struct Measured {
     tallies: Vec<Tally>,
 }
 
-/// Measures, and draws where `options.plot` says so.
+/// Measures; draws and writes where `options.plot` and `options.document` say so.
 pub fn run(options: &Options) -> Result<Report, EntryError> {
     let (contenders, ticks) = (contenders(), options.ticks.unwrap_or(TICKS));
     let progress = progress_bar(u64::from(ticks) * SUBJECTS.len() as u64);
@@ -51,6 +52,9 @@ pub fn run(options: &Options) -> Result<Report, EntryError> {
     let measured = measured?;
     if let Some(path) = &options.plot {
         plot::draw(&contenders, &measured, path).map_err(|error| format!("{}: {error}", path.display()))?;
+    }
+    if let Some(path) = &options.document {
+        document::write(&contenders, &measured, ticks, path).map_err(|error| format!("{}: {error}", path.display()))?;
     }
     Ok(report::report(&contenders, &measured))
 }

@@ -43,20 +43,26 @@ pub fn report(contenders: &[Contender], measured: &[Measured]) -> Report {
 
 /// Work and time.
 fn cells(tally: &Tally) -> [String; 2] {
+    [work(tally), three_digits(tally.ms_per_tick())]
+}
+
+/// Thousands of block operations a tick, and the share of islands that were not solved.
+pub(super) fn work(tally: &Tally) -> String {
     let unsolved = tally.unsolved_share();
     let note = if unsolved > 0.0 { format!(" ({:.0} %)", (100.0 * unsolved).ceil()) } else { String::new() };
-    [three_digits(tally.work_per_tick() * 1e-3) + &note, three_digits(tally.ms_per_tick())]
+    three_digits(tally.work_per_tick() * 1e-3) + &note
 }
 
 /// The fixed choice with the least work among those that solve a subject.
-struct Best<'a> {
-    name: &'a str,
-    auto_over_it: f64,
+pub(super) struct Best<'a> {
+    pub name: &'a str,
+    /// Work of `auto` over its.
+    pub auto_over_it: f64,
 }
 
 impl<'a> Best<'a> {
     /// `auto` is the first contender; where nobody else solves the subject it is held against itself.
-    fn of(contenders: &'a [Contender], measured: &Measured) -> Self {
+    pub fn of(contenders: &'a [Contender], measured: &Measured) -> Self {
         let (auto, fixed) = (&measured.tallies[0], &measured.tallies[1..]);
         let solves = |tally: &Tally| tally.unsolved_share() <= auto.unsolved_share() + AS_GOOD;
         let best = contenders[1..].iter().zip(fixed).filter(|(_, tally)| solves(tally)).min_by_key(|(_, t)| t.work);
