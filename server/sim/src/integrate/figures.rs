@@ -10,8 +10,8 @@ use super::figure::{Figure, part_momentum, world_inertia};
 use super::pull_back::{add_block, inertia_block, pull_back};
 use crate::collide::Foot;
 use crate::dof::{ABSENT, Columns, FigureBody, Frame, Inertia, PartPoint, Twist};
-use crate::potential::Wrench;
 use crate::potential::gravity::Gravity;
+use crate::potential::{PairBlocks, Wrench};
 
 /// Takes blocks of a symmetric matrix.
 pub(crate) trait Blocks {
@@ -202,12 +202,14 @@ impl Figures {
         for figure in &mut self.list[..self.used] {
             energy += figure.evaluate(dt, gravity, attached, &mut self.wrenches, residual);
         }
-        for k in 0..self.attachments.len() {
-            let wrench = self.wrenches[k].numbers();
+        for (k, wrench) in self.wrenches.iter().enumerate().filter(|(_, wrench)| **wrench != Wrench::ZERO) {
+            let numbers = wrench.numbers();
+            // Nothing turns a place.
+            let rows = if self.attachments[k].follows == Follows::Place { 3 } else { 6 };
             for influence in self.influences(k) {
                 let entry = &mut residual[influence.block as usize];
                 for (entry, column) in entry.iter_mut().zip(&influence.columns) {
-                    *entry += (0..6).map(|i| column[i] * wrench[i]).sum::<f64>();
+                    *entry += column.iter().zip(&numbers).take(rows).map(|(c, w)| c * w).sum::<f64>();
                 }
             }
         }
@@ -220,9 +222,14 @@ impl Figures {
         self.hessians.resize(self.attachments.len(), zero());
     }
 
-    /// Adds to the Hessian on attachment `k`.
-    pub fn stiffen(&mut self, k: usize, block: &Block<6>, factor: f64) {
-        add_block(&mut self.hessians[k], block, factor);
+    /// Adds to the Hessian on attachment `k` what a term has there at its `end`.
+    pub fn stiffen(&mut self, k: usize, term: &PairBlocks, end: usize, factor: f64) {
+        let target = &mut self.hessians[k];
+        if self.attachments[k].follows == Follows::Place {
+            add_block(target, &term.own::<3>(end), factor);
+        } else {
+            add_block(target, &term.own::<6>(end), factor);
+        }
     }
 
     /// Hands over the blocks of the figures' inertia, of their own potentials, and of what acts on single attachments.

@@ -254,20 +254,19 @@ impl<const D: usize> Visitor for Assemble<'_, D> {
             let hessian = term.hessian(self.dt, pair(self.frames, term));
             let frames = term.frames();
             for (end, &frame) in frames.iter().enumerate().filter(|&(_, &frame)| frame != FIXED) {
-                let own = hessian.own(end);
                 match self.matrix.diagonal.get_mut(frame as usize) {
-                    Some(diagonal) => add_scaled(diagonal, &own, factor),
+                    Some(diagonal) => add_scaled(diagonal, &hessian.own::<D>(end), factor),
                     // Summed up at the point and pulled back once for all terms.
-                    None => self.figures.stiffen(frame as usize - blocks, &own, factor),
+                    None => self.figures.stiffen(frame as usize - blocks, &hessian, end, factor),
                 }
             }
             let [a, b] = frames;
             if slot != NONE {
-                let ab = hessian.between();
+                let ab = hessian.between::<D>();
                 let below = if a < b { transpose(&ab) } else { ab };
                 add_scaled(&mut self.matrix.lower[slot as usize], &below, factor);
             } else if a != FIXED && b != FIXED {
-                self.pull_back([a, b], &hessian.between(), factor);
+                self.pull_back([a, b], &hessian.between::<6>(), factor);
             }
         }
     }

@@ -62,9 +62,11 @@ fn product<const L: usize, const R: usize>(h: &Block<6>, columns: &Columns) -> [
     product
 }
 
-/// target += factor source.
-pub(super) fn add_block(target: &mut Block<6>, source: &Block<6>, factor: f64) {
-    target.iter_mut().zip(source).for_each(|(target, source)| add_row(target, source, factor));
+/// target += factor source, the leading part that the source has.
+pub(super) fn add_block<const R: usize>(target: &mut Block<6>, source: &Block<R>, factor: f64) {
+    for (target, source) in target.iter_mut().zip(source) {
+        target.iter_mut().zip(source).for_each(|(target, source)| *target += factor * source);
+    }
 }
 
 fn add_row<const R: usize>(target: &mut [f64; R], source: &[f64; R], factor: f64) {

@@ -321,17 +321,23 @@ impl PairBlocks {
         self.turns[1] += k;
     }
 
-    /// Second derivative by the displacement of one frame: 0 is a, 1 is b.
+    /// Second derivative by the displacement of one frame, 0 is a, 1 is b: all of it with R = 6, that of places with 3.
     #[inline]
-    pub fn own(&self, end: usize) -> Block<6> {
+    pub fn own<const R: usize>(&self, end: usize) -> Block<R> {
+        if R <= 3 {
+            return quarter(&self.points, 1.0);
+        }
         // J = [I, −[r]×]: Jᵀ K J = [K, −K [r]×; [r]× K, −[r]× K [r]×].
         let k = turned(&self.points, self.arms[end]);
         block(self.points, -k, -k.transpose(), self.turns[end] - crossed(self.arms[end], &k))
     }
 
-    /// Second derivative by the displacements of a, rows, and b, columns.
+    /// Second derivative by the displacements of a, rows, and b, columns; R as in [`PairBlocks::own`].
     #[inline]
-    pub fn between(&self) -> Block<6> {
+    pub fn between<const R: usize>(&self) -> Block<R> {
+        if R <= 3 {
+            return quarter(&self.points, -1.0);
+        }
         let (ka, kb) = (turned(&self.points, self.arms[0]), turned(&self.points, self.arms[1]));
         block(-self.points, kb, ka.transpose(), self.turns_between + crossed(self.arms[0], &kb))
     }
@@ -350,14 +356,18 @@ fn crossed(r: DVec3, m: &DMat3) -> DMat3 {
     DMat3::from_cols(r.cross(m.x_axis), r.cross(m.y_axis), r.cross(m.z_axis))
 }
 
+/// `factor` × the symmetric `k` as the leading part of a block.
+#[inline]
+fn quarter<const R: usize>(k: &DMat3, factor: f64) -> Block<R> {
+    let columns = k.to_cols_array_2d();
+    std::array::from_fn(|i| std::array::from_fn(|j| if i < 3 && j < 3 { factor * columns[i][j] } else { 0.0 }))
+}
+
 /// A block out of its quarters: translation by translation, translation by rotation, and so on.
 #[inline]
-fn block(ll: DMat3, la: DMat3, al: DMat3, aa: DMat3) -> Block<6> {
-    let row = |left: &DMat3, right: &DMat3, i: usize| {
-        let (l, r) = (left.to_cols_array_2d(), right.to_cols_array_2d());
-        [l[0][i], l[1][i], l[2][i], r[0][i], r[1][i], r[2][i]]
-    };
-    [row(&ll, &la, 0), row(&ll, &la, 1), row(&ll, &la, 2), row(&al, &aa, 0), row(&al, &aa, 1), row(&al, &aa, 2)]
+fn block<const R: usize>(ll: DMat3, la: DMat3, al: DMat3, aa: DMat3) -> Block<R> {
+    let quarters = [[ll, la], [al, aa]].map(|row| row.map(|quarter| quarter.to_cols_array_2d()));
+    std::array::from_fn(|i| std::array::from_fn(|j| quarters[i / 3][j / 3][j % 3][i % 3]))
 }
 
 /// Positive part of the geometric stiffness of a gradient `force` that acts at `arm`, with respect to turns of the body.

@@ -61,7 +61,10 @@ pub(super) struct Line<S> {
 
 impl<S: Scalar> Line<S> {
     pub fn new(ends: &[End; 2], [a, b]: [&Frame<S>; 2]) -> Self {
-        let arms = [a.arm(ends[0].point), b.arm(ends[1].point)];
+        // The frames of figures are where the ends are.
+        let arm =
+            |end: &End, frame: &Frame<S>| if end.point == DVec3::ZERO { Vec3::ZERO } else { frame.arm(end.point) };
+        let arms = [arm(&ends[0], a), arm(&ends[1], b)];
         Self { arms, vector: b.position + arms[1] - a.position - arms[0] }
     }
 

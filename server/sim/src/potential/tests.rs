@@ -114,7 +114,7 @@ pub(super) fn automatic_hessian(term: &impl Term, at: &[Frame<f64>; 2], accuracy
 pub(super) fn check_hessian(term: &impl Term, at: &[Frame<f64>; 2], accuracy: f64) {
     let automatic = automatic_hessian(term, at, accuracy);
     let hessian = term.hessian(DT, [&at[0], &at[1]]);
-    let (aa, ab, bb) = (hessian.own(0), hessian.between(), hessian.own(1));
+    let (aa, ab, bb) = (hessian.own::<6>(0), hessian.between::<6>(), hessian.own::<6>(1));
     let size = (0..12).map(|i| automatic[i][i].abs()).fold(1e-9, f64::max);
     for (i, j) in (0..12).flat_map(|i| (0..12).map(move |j| (i, j))) {
         let written = match (i / 6, j / 6) {

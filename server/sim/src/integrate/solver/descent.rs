@@ -47,6 +47,8 @@ pub(super) struct Descent<const D: usize> {
     /// Friction's tangent comes in at this iteration; later each time that it was of no use.
     friction_from: usize,
     friction_failures: usize,
+    /// Something in the island holds things on arcs.
+    bends: bool,
     best: Best<D>,
     watchdog: Watchdog<D>,
     matrix: Matrix<D>,
@@ -117,7 +119,8 @@ impl<const D: usize> Descent<D> {
         let merit = guess(problem, settings, &mut work, &mut self.u, &mut self.start, &mut self.residual);
         let mut report = SolveReport { merit, ..SolveReport::default() };
         self.best.forget();
-        self.watchdog.begin(method.walk() == Walk::NEWTON && problem.bends());
+        self.bends = method.walk() == Walk::NEWTON && problem.bends();
+        self.watchdog.begin(self.bends);
         (self.friction_from, self.friction_failures) = (FRICTION_FROM, 0);
         let mut goal = Goal { residual: settings.tolerance * problem.dt, iterations: settings.iterations() };
         let mut rounds = 0;
@@ -190,6 +193,11 @@ impl<const D: usize> Descent<D> {
 
     /// Tries the step that knows how friction follows the load. Answers the incremental potential where it ends, J, or
     /// nothing where the residual does not shrink: then all is as it was.
+    ///
+    /// Where something bends a full step raises the residual whatever friction does. There the step is walked along like
+    /// any other, if it leads downhill, and the line search takes friction's limits anew wherever it looks: of a flock of
+    /// 40 walking sheep 0.8 instead of 3.3 islands a tick end at the cap of iterations, and evaluations fall by a third.
+    /// Contacts alone keep the test: without it six crates that were thrown at one another got 24 mm deep instead of 5.
     fn follow_friction(
         &mut self,
         method: &mut dyn Solver<D>,
@@ -206,6 +214,13 @@ impl<const D: usize> Descent<D> {
             return None;
         }
         report.linear_iterations += iterations;
+        if self.bends {
+            let descends = inner(&self.residual, &self.step) < 0.0;
+            if !descends {
+                self.step.clone_from(&self.symmetric_step);
+            }
+            return None;
+        }
         problem.propose(&self.step);
         work.told_potentials();
         self.start.clone_from(&self.u);
@@ -299,11 +314,15 @@ impl<const D: usize> Descent<D> {
         method.walked(alpha, &self.step, &self.residual);
     }
 
-    /// The directional derivative so many steps from `start`, with what is frozen left as it is, J.
+    /// The directional derivative so many steps from `start`, J. What is frozen is left as it is, but where something bends.
     fn slope_at(&mut self, alpha: f64, problem: &mut Problem, work: &mut Work) -> f64 {
         self.go(alpha, problem, work);
-        problem.evaluate(&mut self.residual);
-        work.evaluated();
+        if self.bends {
+            self.relinearise(problem, work);
+        } else {
+            problem.evaluate(&mut self.residual);
+            work.evaluated();
+        }
         inner(&self.residual, &self.step)
     }
 
