@@ -8,7 +8,7 @@ mod within;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use pita_protocol::dof::Precision;
+use pita_protocol::dof::{Precision, STEPS_MAX};
 use serde::Deserialize;
 
 pub use within::{TickRate, Within};
@@ -103,6 +103,29 @@ pub struct PrecisionSteps {
     pub rotation_steps: Within<64, 8192>,
     /// Steps of a metre or radian of joint coordinates.
     pub joint_steps: Within<10, 65_536>,
+}
+
+impl PrecisionSteps {
+    /// Checks that the steps of positions cover an arena whose bodies come as far as `reach_m` from the origin.
+    ///
+    /// # Errors
+    /// [`ConfigError::Key`], which calls the configuration `file`.
+    pub fn check_reach(&self, reach_m: f64, file: &str) -> Result<(), ConfigError> {
+        let steps = self.steps_per_m.get();
+        let most = (f64::from(STEPS_MAX) / reach_m.max(1.0)) as u32;
+        if steps <= most {
+            return Ok(());
+        }
+        Err(ConfigError::Key {
+            file: file.to_owned(),
+            key: "precision.steps_per_m".to_owned(),
+            reason: format!(
+                "{steps} steps a metre reach {:.0} m from the origin, and the arena's bounds {reach_m} m: allowed is 10 to \
+                 {most}, or bounds that are nearer",
+                f64::from(STEPS_MAX) / f64::from(steps)
+            ),
+        })
+    }
 }
 
 impl From<PrecisionSteps> for Precision {
@@ -263,6 +286,16 @@ mod tests {
     #[test]
     fn the_default_precision_is_the_protocols() {
         assert_eq!(Precision::from(ServerConfig::built_in().precision), Precision::default());
+    }
+
+    #[test]
+    fn positions_have_to_cover_the_arena() {
+        let config = ServerConfig::parse("[precision]\nsteps_per_m = 20000", "my.toml").unwrap();
+        assert!(config.precision.check_reach(3000.0, "my.toml").is_ok());
+        let said = config.precision.check_reach(5000.0, "my.toml").unwrap_err().to_string();
+        for word in ["my.toml", "precision.steps_per_m", "20000", "5000 m", "10 to 13421"] {
+            assert!(said.contains(word), "{said:?} lacks {word:?}");
+        }
     }
 
     #[test]

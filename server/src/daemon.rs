@@ -17,14 +17,14 @@ use tokio::sync::oneshot;
 use crate::admin::{Doorkeeper, SecretError};
 use crate::arena_source::{ArenaText, SourceError};
 use crate::cli::RunArgs;
-use crate::config::{ConfigError, ServerConfig};
+use crate::config::{BUILT_IN, ConfigError, ServerConfig};
 use crate::network::{self, NetworkError};
 use crate::output::Output;
 use crate::report::Troubles;
 use crate::sessions::{Limits, Sessions};
 use crate::shared::{Phase, Shared, Start};
 use crate::stopwatch::Clock;
-use crate::{admin, description, metrics, report};
+use crate::{admin, description, frame, metrics, report};
 use serve::{Happening, Serving};
 
 /// Threads of the runtime: signals, status lines and Zenoh's set-up; its traffic has threads of its own.
@@ -116,6 +116,8 @@ fn configure(args: &RunArgs) -> Result<Configured, DaemonError> {
     let settings = reload::settings(&config);
     let text = ArenaText::find(&config.arena.source, &config.arena.parameters)?;
     let arena = text.build(&settings)?;
+    let file = args.config.as_ref().map_or(BUILT_IN.to_owned(), |file| file.display().to_string());
+    config.precision.check_reach(arena.reach_m(), &file)?;
     let secret_file = Some(&config.admin.secret_file).filter(|file| !file.as_os_str().is_empty());
     let doorkeeper = Doorkeeper::new(secret_file.map(|file| admin::read_secret(file)).transpose()?);
     Ok(Configured { config, arena, source: text.source(), doorkeeper })
@@ -153,6 +155,7 @@ fn share(config: &ServerConfig, arena: &Arena, source: ArenaSource, clock: Clock
     let limits = config.sessions;
     let description = description::describe(arena, config.precision.into());
     description::check(&description).map_err(DaemonError::Undescribable)?;
+    frame::check(arena.world()).map_err(DaemonError::Undescribable)?;
     // Ranges of the configuration are within u16.
     let players = arena.max_players().min(limits.players_max.get() as u16);
     let inputs = limits.inputs_per_tick_max.get();

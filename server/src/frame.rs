@@ -152,7 +152,7 @@ impl Dof {
         self.actors.clear();
     }
 
-    /// A slice of more groups than a body may have on the wire is left out: nobody sees it.
+    /// A slice of more groups than a body may have on the wire is left out, which [`check`] refuses of an arena's own.
     fn push(&mut self, slice: &SliceView<'_>) {
         let (groups, numbers) = (self.layouts.len(), self.numbers.len());
         let kind = kind_on_wire(slice.kind);
@@ -237,6 +237,27 @@ fn groups_of(kind: u8, block: BlockSize) -> impl Iterator<Item = Group> {
         (positions, _) => (&[][..], usize::from(positions)),
     };
     groups.iter().copied().chain(std::iter::repeat_n(Group::Scalar, scalars))
+}
+
+/// Checks that every body of `world` can be sent.
+///
+/// # Errors
+/// What is too large, in words for a person.
+pub fn check(world: &World) -> Result<(), String> {
+    world.slices().try_for_each(|slice| check_slice(&slice))
+}
+
+fn check_slice(slice: &SliceView<'_>) -> Result<(), String> {
+    let kind = kind_on_wire(slice.kind);
+    let groups: usize = slice.blocks.iter().map(|block| groups_of(kind, *block).count()).sum();
+    if groups <= BODY_GROUPS_MAX {
+        return Ok(());
+    }
+    Err(format!(
+        "a body of the arena ({:?}) has {groups} points, rotations and joint coordinates, and at most {BODY_GROUPS_MAX} \
+         can be sent: make its mesh or lattice coarser",
+        slice.kind
+    ))
 }
 
 /// What the wire calls a kind.
@@ -342,6 +363,17 @@ mod tests {
         assert_eq!(groups(kind::ARTICULATED, &[block(1, 1), block(2, 2)]), [Group::Scalar; 3]);
         assert_eq!(groups(kind::NATURAL, &[block(3, 3); 13]), [Group::Point; 13]);
         assert_eq!(groups(kind::OWN, &[block(3, 3)]), [Group::Scalar; 3]);
+    }
+
+    #[test]
+    fn what_cannot_be_sent_is_refused_by_name() {
+        let check = |nodes| {
+            let blocks = vec![BlockSize { positions: 3, rates: 3 }; nodes];
+            check_slice(&SliceView { serial: 1, kind: DofKind::Lattice, blocks: &blocks, q: &[], v: &[] })
+        };
+        assert_eq!(check(BODY_GROUPS_MAX), Ok(()));
+        let said = check(BODY_GROUPS_MAX + 1).unwrap_err();
+        assert!(said.contains("Lattice") && said.contains("4097") && said.contains("4096"), "{said}");
     }
 
     #[test]

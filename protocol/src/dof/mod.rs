@@ -36,7 +36,7 @@ pub use cells::{Cadence, CellEncoder};
 pub use frame::{BODIES_MAX, BODY_GROUPS_MAX, Body, Frame, GROUPS_MAX, State};
 pub use predict::GroupState;
 pub use priority::{Priorities, Relevance};
-pub use quantise::{Group, Precision, Quantised, absolute, relative, rotate};
+pub use quantise::{Group, Precision, Quantised, STEPS_MAX, absolute, relative, rotate};
 pub use slice::Slice;
 pub use stream::{Decoder, Encoder, HISTORY};
 

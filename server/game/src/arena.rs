@@ -242,6 +242,11 @@ impl Arena {
         &self.materials
     }
 
+    /// The largest coordinate, in size, that bodies have before they are put back, m.
+    pub fn reach_m(&self) -> f64 {
+        self.bounds.min.iter().chain(&self.bounds.max).fold(0.0, |reach, x| f64::max(reach, x.abs()))
+    }
+
     /// What happened in the last tick, in order, and what was added since.
     pub fn events(&self) -> &[ArenaEvent] {
         &self.events
