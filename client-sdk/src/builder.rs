@@ -9,7 +9,7 @@ use pita_protocol::{
 };
 
 use crate::{
-    conditioner::ConditionerSettings, error::ClientError, interpolation::InterpolationSettings, join::join,
+    conditioner::ConditionerSettings, datagrams, error::ClientError, interpolation::InterpolationSettings, join::join,
     session::Session, transport,
 };
 
@@ -24,6 +24,7 @@ pub struct SessionBuilder {
     pub(crate) loss_timeout: Duration,
     pub(crate) interpolation: Option<InterpolationSettings>,
     pub(crate) conditioner: Option<ConditionerSettings>,
+    pub(crate) datagrams: Option<String>,
     bytes_per_s: Option<u32>,
     resume: Option<ResumeTicket>,
     #[cfg(feature = "prediction")]
@@ -66,6 +67,7 @@ impl SessionBuilder {
             loss_timeout: Duration::from_secs(3),
             interpolation: Some(InterpolationSettings::default()),
             conditioner: None,
+            datagrams: None,
             bytes_per_s: None,
             resume: None,
             #[cfg(feature = "prediction")]
@@ -101,6 +103,14 @@ impl SessionBuilder {
     /// would need.
     pub fn interpolation(mut self, settings: Option<InterpolationSettings>) -> Self {
         self.interpolation = settings;
+        self
+    }
+
+    /// Takes snapshots as datagrams from the server's `network.datagrams` (`udp/HOST:PORT`), over a connection of their
+    /// own: where packets get lost, a lost one does not hold up those behind it. Where none come through, snapshots come
+    /// over the first connection after all. Otherwise all of it comes over TCP.
+    pub fn datagrams(mut self, endpoint: &str) -> Self {
+        self.datagrams = Some(endpoint.to_owned());
         self
     }
 
@@ -140,8 +150,13 @@ impl SessionBuilder {
         let resume = self.resume.as_ref().map(ResumeTicket::proof);
         let request = JoinRequest { name: self.name.clone(), role: self.role, bytes_per_s: self.bytes_per_s, resume };
         request.validate().map_err(ClientError::BadArgument)?;
+        self.datagrams.as_deref().map_or(Ok(()), datagrams::check)?;
         let zenoh = transport::open(&self.endpoint, self.connect_timeout).await?;
-        let joined = join(&self, &zenoh, request).await;
+        let datagrams = match &self.datagrams {
+            Some(endpoint) => datagrams::open(endpoint, self.connect_timeout).await,
+            None => None,
+        };
+        let joined = join(&self, &zenoh, datagrams, request).await;
         if joined.is_err() {
             transport::close(&zenoh).await;
         }

@@ -21,6 +21,12 @@ pub enum ClientError {
         /// What the transport said.
         reason: String,
     },
+    /// Joins, inputs and events were to go over datagrams, which get lost.
+    #[error("{0} would lose inputs and events: connect over tcp/HOST:PORT, and name this one as `datagrams` besides")]
+    Control(String),
+    /// Datagrams were to come over something else than UDP.
+    #[error("{0} is nothing that datagrams come over: name the server's udp/HOST:PORT, or none")]
+    Datagrams(String),
     /// Something speaks Zenoh at the endpoint, but no arena answered.
     #[error("{endpoint} was reached, but no arena{} answered within {waited:?}: check that a PITA server runs there{}",
         named(.arena), if .arena.is_some() { " and that it runs this arena" } else { "" })]

@@ -1,7 +1,10 @@
 //! How a session comes about on an open connection: find the arena, listen for events, join, declare the rest.
 
 use std::{
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
     time::{Duration, Instant},
 };
 
@@ -15,6 +18,7 @@ use zenoh::{liveliness::LivelinessToken, pubsub::Subscriber};
 use crate::{
     builder::SessionBuilder,
     conditioner::{ConditionerSettings, Delivery, Link},
+    datagrams::Following,
     error::ClientError,
     interpolation::{InterpolationBuffer, Playback},
     keeper::{self, EVENTS_MAX, Incoming, Keeper},
@@ -37,14 +41,22 @@ const ACKNOWLEDGED: Duration = Duration::from_millis(66);
 #[derive(Debug)]
 pub struct Declared {
     _events: Subscriber<()>,
-    _snapshots: Subscriber<()>,
+    _snapshots: Snapshots,
     _token: LivelinessToken,
 }
 
-/// Joins as `wanted` says.
+/// What brings snapshots.
+#[derive(Debug)]
+enum Snapshots {
+    Control { _subscriber: Subscriber<()> },
+    Datagrams { _following: Following },
+}
+
+/// Joins as `wanted` says; snapshots are to come over `datagrams` where there are any.
 pub async fn join(
     wanted: &SessionBuilder,
     zenoh: &zenoh::Session,
+    datagrams: Option<zenoh::Session>,
     request: JoinRequest,
 ) -> Result<Session, ClientError> {
     let arena = match &wanted.arena {
@@ -63,9 +75,14 @@ pub async fn join(
         shared.prediction = Some(Mutex::new(predictor(wanted, zenoh, &keys, &accepted).await?));
     }
     let shared = Arc::new(shared);
+    let snapshots =
+        SnapshotKey { key: keys.snapshot(accepted.slot), shared: Arc::clone(&shared), conditioner: wanted.conditioner };
     let declared = Declared {
         _events: events,
-        _snapshots: subscribe_to_snapshots(zenoh, &keys, &accepted, &shared, wanted.conditioner).await?,
+        _snapshots: match datagrams {
+            Some(datagrams) => Snapshots::Datagrams { _following: Following::new(zenoh.clone(), datagrams, snapshots) },
+            None => Snapshots::Control { _subscriber: snapshots.subscribe(zenoh, None).await? },
+        },
         _token: declare_alive(zenoh, &keys, &accepted).await?,
     };
     let wire = Arc::new(Wire::open(zenoh, &keys, &accepted, Arc::clone(&shared), wanted.conditioner).await?);
@@ -177,16 +194,31 @@ async fn subscribe(
     subscribed.map_err(ClientError::transport(action))
 }
 
-async fn subscribe_to_snapshots(
-    zenoh: &zenoh::Session,
-    keys: &Keys,
-    accepted: &JoinAccepted,
-    shared: &Arc<Shared>,
+/// What a session's snapshots are asked for by, over whichever connection.
+#[derive(Debug)]
+pub struct SnapshotKey {
+    key: String,
+    shared: Arc<Shared>,
     conditioner: Option<ConditionerSettings>,
-) -> Result<Subscriber<()>, ClientError> {
-    let (shared, key) = (Arc::clone(shared), keys.snapshot(accepted.slot));
-    let take = move |bytes: &[u8]| shared.take_snapshot(bytes, Instant::now());
-    subscribe(zenoh, key, "subscribe to snapshots", conditioner, Delivery::Datagrams, take).await
+}
+
+impl SnapshotKey {
+    /// Asks for them over `zenoh`; each that comes is counted.
+    pub async fn subscribe(
+        &self,
+        zenoh: &zenoh::Session,
+        counted: Option<Arc<AtomicU64>>,
+    ) -> Result<Subscriber<()>, ClientError> {
+        let shared = Arc::clone(&self.shared);
+        let take = move |bytes: &[u8]| {
+            if let Some(counted) = &counted {
+                counted.fetch_add(1, Ordering::Relaxed);
+            }
+            shared.take_snapshot(bytes, Instant::now());
+        };
+        let (action, delivery) = ("subscribe to snapshots", Delivery::Datagrams);
+        subscribe(zenoh, self.key.clone(), action, self.conditioner, delivery, take).await
+    }
 }
 
 async fn declare_alive(

@@ -15,6 +15,7 @@
 pub mod bots;
 mod builder;
 mod conditioner;
+mod datagrams;
 mod error;
 mod events;
 mod inbox;

@@ -1,4 +1,4 @@
-//! How a session uses Zenoh: one connection to one endpoint, no scouting, bounded messages.
+//! How a session uses Zenoh: connections to one endpoint each, no scouting, bounded messages.
 
 use std::time::Duration;
 
@@ -22,17 +22,32 @@ const ANSWERS_MAX: usize = 16;
 /// How long a connection may take to close, before it is left to the operating system.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
 
+/// Longest datagram, bytes: what passes every network in one piece. The server keeps to the least of both sides.
+const DATAGRAM_MAX: u16 = 1400;
+
 /// Connects to `endpoint`, in one attempt.
 pub async fn open(endpoint: &str, patience: Duration) -> Result<zenoh::Session, ClientError> {
+    if endpoint.starts_with("udp/") {
+        return Err(ClientError::Control(endpoint.to_owned()));
+    }
+    open_with(endpoint, patience, u16::MAX).await
+}
+
+/// Connects to `endpoint` for datagrams, in one attempt.
+pub async fn open_datagrams(endpoint: &str, patience: Duration) -> Result<zenoh::Session, ClientError> {
+    open_with(endpoint, patience, DATAGRAM_MAX).await
+}
+
+async fn open_with(endpoint: &str, patience: Duration, batch_max: u16) -> Result<zenoh::Session, ClientError> {
     let unreachable = |reason: String| ClientError::Unreachable { endpoint: endpoint.to_owned(), reason };
-    let config = config(endpoint).map_err(|error| unreachable(error.to_string()))?;
+    let config = config(endpoint, batch_max).map_err(|error| unreachable(error.to_string()))?;
     match timeout(patience, zenoh::open(config)).await {
         Ok(opened) => opened.map_err(|_| unreachable("no connection".to_owned())),
         Err(_) => Err(unreachable(format!("no connection within {patience:?}"))),
     }
 }
 
-fn config(endpoint: &str) -> zenoh::Result<Config> {
+fn config(endpoint: &str, batch_max: u16) -> zenoh::Result<Config> {
     let mut config = Config::default();
     let endpoints = serde_json::json!([endpoint]).to_string();
     for (key, value) in [
@@ -41,6 +56,7 @@ fn config(endpoint: &str) -> zenoh::Result<Config> {
         ("scouting/multicast/enabled", "false"),
         ("scouting/gossip/enabled", "false"),
         ("transport/link/tx/lease", &LEASE_MS.to_string()),
+        ("transport/link/tx/batch_size", &batch_max.to_string()),
         ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "0"),
         ("transport/link/rx/max_message_size", &MESSAGE_MAX.to_string()),
     ] {

@@ -43,6 +43,9 @@ pub struct RunArgs {
     /// Endpoint to listen on; port 0 takes a free one
     #[arg(long, value_name = "tcp/ADDRESS:PORT")]
     pub listen: Option<String>,
+    /// Endpoint for snapshots as datagrams besides; port 0 takes a free one
+    #[arg(long, value_name = "udp/ADDRESS:PORT")]
+    pub datagrams: Option<String>,
     /// Name of a built-in arena, or path of an arena file
     #[arg(long, value_name = "NAME|FILE")]
     pub arena: Option<String>,

@@ -47,6 +47,8 @@ pub struct ServerConfig {
 pub struct Network {
     /// Endpoint to listen on.
     pub listen: String,
+    /// Endpoint for snapshots as datagrams; empty for none.
+    pub datagrams: String,
     /// Silence after which a connection is closed, ms.
     pub lease_ms: Within<500, 60_000>,
     /// Connections at once.
@@ -234,9 +236,9 @@ impl ServerConfig {
         let mut merged: toml::Table = DEFAULT_TEXT.parse().map_err(syntax)?;
         overlay(&mut merged, given);
         let config = Self::deserialize(toml::Value::Table(merged)).map_err(|e| key_error(file, &e))?;
-        crate::network::check_endpoint(&config.network.listen).map_err(|reason| ConfigError::Key {
+        crate::network::check_endpoints(&config.network).map_err(|(key, reason)| ConfigError::Key {
             file: file.to_owned(),
-            key: "network.listen".to_owned(),
+            key: key.to_owned(),
             reason,
         })?;
         Ok(config)
@@ -312,6 +314,7 @@ mod tests {
             ("[session]\nplayers_max = 3", &["my.toml", "session", "unknown"]),
             ("tick = 3", &["my.toml", "tick", "3"]),
             ("[network]\nlisten = 'localhost'", &["network.listen", "localhost", "tcp/"]),
+            ("[network]\ndatagrams = 'tcp/127.0.0.1:1'", &["my.toml", "network.datagrams", "tcp/127.0.0.1:1", "udp/"]),
             ("[tick]\ntick_hz =", &["my.toml", "line 2"]),
         ] {
             let said = refusal(text);

@@ -106,6 +106,9 @@ fn configure(args: &RunArgs) -> Result<Configured, DaemonError> {
     if let Some(listen) = &args.listen {
         config.network.listen.clone_from(listen);
     }
+    if let Some(datagrams) = &args.datagrams {
+        config.network.datagrams.clone_from(datagrams);
+    }
     if let Some(arena) = &args.arena {
         config.arena.source.clone_from(arena);
     }
@@ -140,9 +143,9 @@ fn run_arena(configured: Configured, clock: Clock, out: &Output) -> Result<(), D
         // Before anything that has to be ended in order.
         let ending = watch_signals(Signals::new()?);
         let shared = Arc::new(share(config, &arena, source, clock)?);
-        let (session, endpoint) = network::open(&config.network, &shared.keys).await?;
+        let (session, endpoints) = network::open(&config.network, &shared.keys).await?;
         let mut serving = Serving::start(config, arena, doorkeeper, &shared, session)?;
-        out.print(&report::welcome(&endpoint, &metrics::status(&shared)));
+        out.print(&report::welcome(&endpoints, &metrics::status(&shared)));
         let ended = watch(config, &shared, &mut serving, ending, out).await;
         say_farewell(&shared).await;
         serving.stop(&shared).await;

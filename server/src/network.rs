@@ -1,10 +1,10 @@
 //! Zenoh: how the daemon's session is configured and opened.
 //!
-//! Owns the choices that keep one client from harming the others: a peer that listens on TCP and neither scouts nor
-//! gossips, puts that are dropped rather than waited for, bounded messages, bounded input rate, and access rules: the
+//! Owns the choices that keep one client from harming the others: a peer that listens on TCP, and for snapshots on UDP
+//! where it is told to, and neither scouts nor gossips, puts that are dropped rather than waited for, bounded messages, bounded input rate, and access rules: the
 //! peer forwards from client to client, so without them anybody could put snapshots and answer joins in its name.
 
-use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 
 use pita_protocol::Keys;
 use pita_protocol::keys::{ANY_JOIN, ANY_STATUS};
@@ -31,9 +31,14 @@ const FREE_PORT_ATTEMPTS: usize = 5;
 /// Why the daemon does not listen.
 #[derive(Debug, thiserror::Error)]
 pub enum NetworkError {
-    /// The endpoint is not of the form that we listen on.
-    #[error("network.listen: {0}")]
-    Endpoint(String),
+    /// An endpoint is not of the form that we listen on.
+    #[error("network.{key}: {reason}")]
+    Endpoint {
+        /// Key of the configuration.
+        key: &'static str,
+        /// What is wrong with its value.
+        reason: String,
+    },
     /// The address cannot be had.
     #[error("cannot listen on {endpoint}: {reason}{}", hint(endpoint, reason))]
     Bind {
@@ -66,54 +71,123 @@ fn hint(endpoint: &str, reason: &std::io::Error) -> String {
     }
 }
 
-/// Opens the daemon's session; answers it with the endpoint where it listens, its real port in it.
+/// What is listened on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Use {
+    /// Everything, over TCP.
+    Control,
+    /// Snapshots, over UDP.
+    Datagrams,
+}
+
+impl Use {
+    fn key(self) -> &'static str {
+        match self {
+            Self::Control => "listen",
+            Self::Datagrams => "datagrams",
+        }
+    }
+
+    fn protocol(self) -> &'static str {
+        match self {
+            Self::Control => "tcp",
+            Self::Datagrams => "udp",
+        }
+    }
+
+    /// Takes and gives back the address, because that says more clearly than Zenoh why it cannot be had, and which port a
+    /// 0 became.
+    fn free_address(self, endpoint: &str, wanted: SocketAddr) -> Result<String, NetworkError> {
+        let bound = match self {
+            Self::Control => TcpListener::bind(wanted).and_then(|listener| listener.local_addr()),
+            Self::Datagrams => UdpSocket::bind(wanted).and_then(|socket| socket.local_addr()),
+        };
+        let free = bound.map_err(|reason| NetworkError::Bind { endpoint: endpoint.to_owned(), reason })?;
+        Ok(format!("{}/{free}", self.protocol()))
+    }
+
+    /// Names other than `localhost` are not resolved: whether a configuration is valid must not depend on the network.
+    fn address(self, endpoint: &str) -> Result<SocketAddr, String> {
+        let (protocol, other) = (self.protocol(), if self == Self::Control { Self::Datagrams } else { Self::Control });
+        if endpoint.starts_with(&format!("{}/", other.protocol())) {
+            return Err(format!(
+                "{endpoint:?} belongs under network.{}: here it is {protocol}/ADDRESS:PORT, because {}",
+                other.key(),
+                match self {
+                    Self::Control => "joins, inputs and events must not be lost",
+                    Self::Datagrams => "over TCP a lost segment holds up the snapshots behind it",
+                }
+            ));
+        }
+        let address = endpoint.strip_prefix(protocol).and_then(|rest| rest.strip_prefix('/'));
+        let numeric = address.and_then(|address| match address.strip_prefix("localhost:") {
+            Some(port) => Some((Ipv4Addr::LOCALHOST, port.parse().ok()?).into()),
+            None => address.parse().ok(),
+        });
+        numeric.ok_or_else(|| {
+            format!(
+                "{endpoint:?} is no endpoint, allowed is {protocol}/ADDRESS:PORT, for example {protocol}/127.0.0.1:7447"
+            )
+        })
+    }
+}
+
+/// Where the daemon listens, real ports in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Endpoints {
+    /// Everything.
+    pub control: String,
+    /// Snapshots as datagrams.
+    pub datagrams: Option<String>,
+}
+
+/// Opens the daemon's session; answers it with where it listens.
 ///
 /// # Errors
 /// [`NetworkError`], before anything listens.
-pub async fn open(config: &Network, keys: &Keys) -> Result<(zenoh::Session, String), NetworkError> {
-    let wanted = address(&config.listen).map_err(NetworkError::Endpoint)?;
+pub async fn open(config: &Network, keys: &Keys) -> Result<(zenoh::Session, Endpoints), NetworkError> {
+    let address = |of: Use, endpoint: &str| {
+        of.address(endpoint).map_err(|reason| NetworkError::Endpoint { key: of.key(), reason })
+    };
+    let wanted = address(Use::Control, &config.listen)?;
+    let datagrams = match config.datagrams.as_str() {
+        "" => None,
+        endpoint => Some(address(Use::Datagrams, endpoint)?),
+    };
+    let has_free_port = wanted.port() == 0 || datagrams.is_some_and(|datagrams| datagrams.port() == 0);
     let mut attempt = 1;
     loop {
-        let endpoint = format!("tcp/{}", free_address(&config.listen, wanted)?);
-        match zenoh::open(configuration(config, keys, &endpoint)).await {
-            Ok(session) => return Ok((session, endpoint)),
-            Err(_) if wanted.port() == 0 && attempt < FREE_PORT_ATTEMPTS => attempt += 1,
-            Err(reason) => return Err(NetworkError::Zenoh { endpoint, reason: reason.to_string() }),
+        let control = Use::Control.free_address(&config.listen, wanted)?;
+        let free = |wanted| Use::Datagrams.free_address(&config.datagrams, wanted);
+        let endpoints = Endpoints { control, datagrams: datagrams.map(free).transpose()? };
+        match zenoh::open(configuration(config, keys, &endpoints)).await {
+            Ok(session) => return Ok((session, endpoints)),
+            Err(_) if has_free_port && attempt < FREE_PORT_ATTEMPTS => attempt += 1,
+            Err(reason) => {
+                return Err(NetworkError::Zenoh { endpoint: endpoints.control, reason: reason.to_string() });
+            }
         }
     }
 }
 
-/// Checks that `endpoint` is something to listen on.
+/// Checks that `config` names endpoints to listen on.
 ///
 /// # Errors
-/// Text with the endpoint and what is allowed.
-pub fn check_endpoint(endpoint: &str) -> Result<(), String> {
-    address(endpoint).map(drop)
+/// The key, and text with the endpoint and what is allowed.
+pub fn check_endpoints(config: &Network) -> Result<(), (&'static str, String)> {
+    Use::Control.address(&config.listen).map_err(|reason| ("network.listen", reason))?;
+    if !config.datagrams.is_empty() {
+        Use::Datagrams.address(&config.datagrams).map_err(|reason| ("network.datagrams", reason))?;
+    }
+    Ok(())
 }
 
-/// Names other than `localhost` are not resolved: whether a configuration is valid must not depend on the network.
-fn address(endpoint: &str) -> Result<SocketAddr, String> {
-    let numeric = endpoint.strip_prefix("tcp/").and_then(|address| match address.strip_prefix("localhost:") {
-        Some(port) => Some((Ipv4Addr::LOCALHOST, port.parse().ok()?).into()),
-        None => address.parse().ok(),
-    });
-    numeric.ok_or_else(|| {
-        format!("{endpoint:?} is no endpoint, allowed is tcp/ADDRESS:PORT, for example tcp/127.0.0.1:7447")
-    })
-}
-
-/// Takes and gives back the address, because that says more clearly than Zenoh why it cannot be had, and which port a 0
-/// became.
-fn free_address(endpoint: &str, wanted: SocketAddr) -> Result<SocketAddr, NetworkError> {
-    let bound = TcpListener::bind(wanted).and_then(|listener| listener.local_addr());
-    bound.map_err(|reason| NetworkError::Bind { endpoint: endpoint.to_owned(), reason })
-}
-
-fn configuration(config: &Network, keys: &Keys, endpoint: &str) -> zenoh::Config {
+fn configuration(config: &Network, keys: &Keys, endpoints: &Endpoints) -> zenoh::Config {
+    let listen: Vec<_> = [Some(&endpoints.control), endpoints.datagrams.as_ref()].into_iter().flatten().collect();
     let inputs = keys.all_inputs();
     let settings = [
         ("mode", json!("peer")),
-        ("listen/endpoints", json!([endpoint])),
+        ("listen/endpoints", json!(listen)),
         ("scouting/multicast/enabled", json!(false)),
         ("scouting/gossip/enabled", json!(false)),
         ("timestamping/enabled", json!(false)),
@@ -202,7 +276,9 @@ mod tests {
 
     #[test]
     fn zenoh_knows_every_setting() {
-        configuration(&ServerConfig::built_in().network, &Keys::new("a").unwrap(), "tcp/127.0.0.1:7447");
+        let [control, datagrams] = ["tcp/127.0.0.1:7447", "udp/127.0.0.1:7447"].map(str::to_owned);
+        let endpoints = Endpoints { control, datagrams: Some(datagrams) };
+        configuration(&ServerConfig::built_in().network, &Keys::new("a").unwrap(), &endpoints);
     }
 
     /// What arrives first at a client that listens on `key` while another client and then the server put there.
@@ -230,7 +306,7 @@ mod tests {
     async fn clients_cannot_speak_for_the_server() {
         let keys = Keys::new("a").unwrap();
         let config = Network { listen: "tcp/127.0.0.1:0".to_owned(), ..ServerConfig::built_in().network };
-        let (server, endpoint) = open(&config, &keys).await.unwrap();
+        let (server, Endpoints { control: endpoint, .. }) = open(&config, &keys).await.unwrap();
         let answer = |query: zenoh::query::Query| drop(query.reply("pita/a/status", "").wait());
         server.declare_queryable(keys.status()).callback(answer).background().await.unwrap();
         let all = async {
@@ -241,23 +317,42 @@ mod tests {
         tokio::time::timeout(Duration::from_secs(20), all).await.expect("in time");
     }
 
+    fn checked(listen: &str, datagrams: &str) -> Result<(), (&'static str, String)> {
+        let [listen, datagrams] = [listen, datagrams].map(str::to_owned);
+        check_endpoints(&Network { listen, datagrams, ..ServerConfig::built_in().network })
+    }
+
     #[test]
     fn endpoints_are_checked() {
         for good in ["tcp/127.0.0.1:7447", "tcp/[::1]:0", "tcp/localhost:65535"] {
-            assert_eq!(check_endpoint(good), Ok(()));
+            assert_eq!(checked(good, ""), Ok(()));
+            assert_eq!(checked(good, &good.replace("tcp", "udp")), Ok(()));
         }
         for bad in
-            ["", "127.0.0.1:7447", "udp/127.0.0.1:7447", "tcp/127.0.0.1", "tcp/127.0.0.1:70000", "tcp/example.org:1"]
+            ["", "127.0.0.1:7447", "tcp/127.0.0.1", "tcp/127.0.0.1:70000", "tcp/example.org:1", "quic/127.0.0.1:1"]
         {
-            assert!(check_endpoint(bad).unwrap_err().contains("tcp/ADDRESS:PORT"), "{bad}");
+            let (key, said) = checked(bad, "").unwrap_err();
+            assert!(key == "network.listen" && said.contains("tcp/ADDRESS:PORT"), "{said}");
         }
+        for bad in ["udp/127.0.0.1", "quic/127.0.0.1:7447", "udp/example.org:1"] {
+            let (key, said) = checked("tcp/127.0.0.1:0", bad).unwrap_err();
+            assert!(key == "network.datagrams" && said.contains("udp/ADDRESS:PORT"), "{said}");
+        }
+    }
+
+    #[test]
+    fn endpoints_that_were_mixed_up_are_named_with_where_they_belong() {
+        let (key, said) = checked("udp/127.0.0.1:7447", "").unwrap_err();
+        assert!(key == "network.listen" && said.contains("belongs under network.datagrams"), "{said}");
+        let (key, said) = checked("tcp/127.0.0.1:7447", "tcp/127.0.0.1:7448").unwrap_err();
+        assert!(key == "network.datagrams" && said.contains("belongs under network.listen"), "{said}");
     }
 
     #[test]
     fn a_taken_port_is_named_with_what_to_do() {
         let taken = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = taken.local_addr().unwrap();
-        let said = free_address(&format!("tcp/{address}"), address).unwrap_err().to_string();
+        let said = Use::Control.free_address(&format!("tcp/{address}"), address).unwrap_err().to_string();
         for word in [&address.to_string(), "--listen", "pita-server status"] {
             assert!(said.contains(word), "{said:?} lacks {word:?}");
         }

@@ -7,6 +7,7 @@ use pita_protocol::message::Status;
 
 use crate::config::WhenBehind;
 use crate::frame::Totals;
+use crate::network::Endpoints;
 use crate::shared::Shared;
 
 /// Prints `text` and a line end on stdout at once. Where stdout is closed, nobody reads it and the program goes on.
@@ -31,14 +32,19 @@ pub fn rate(bytes_per_s: f64) -> String {
 }
 
 /// What is said at the start, once clients can join.
-pub fn welcome(endpoint: &str, status: &Status) -> String {
+pub fn welcome(endpoints: &Endpoints, status: &Status) -> String {
+    let endpoint = &endpoints.control;
     let connect = match endpoint == pita_protocol::DEFAULT_ENDPOINT {
         true => String::new(),
         false => format!(" --connect {endpoint}"),
     };
+    let datagrams = match &endpoints.datagrams {
+        None => String::new(),
+        Some(datagrams) => format!("\nsnapshots as datagrams on {datagrams}"),
+    };
     format!(
         "PITA {}: arena {} at {} Hz\n\
-         listening on {endpoint}\n\n\
+         listening on {endpoint}{datagrams}\n\n\
          In another terminal:\n\
          \x20 cargo run --release -p pita-client --bin pita-bots -- --count 8{connect}\n\
          \x20 cargo run --release -p pita-tests --bin pita-loadtest\n\

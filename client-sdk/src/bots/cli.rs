@@ -43,6 +43,9 @@ pub struct Args {
     /// Zenoh endpoint of the server.
     #[arg(long, value_name = "ENDPOINT", default_value = DEFAULT_ENDPOINT)]
     connect: String,
+    /// Take snapshots as datagrams from this endpoint of the server.
+    #[arg(long, value_name = "udp/HOST:PORT")]
+    datagrams: Option<String>,
     /// Arena to join; otherwise the server is asked.
     #[arg(long)]
     arena: Option<String>,
@@ -95,6 +98,7 @@ fn init_log() {
 async fn run(args: &Args) -> Result<Report, ClientError> {
     let mut fleet = BotFleet::new(FleetSettings {
         arena: args.arena.clone(),
+        datagrams: args.datagrams.clone(),
         scripts: args.script.clone(),
         seed: args.seed,
         conditioner: args.conditioner,

@@ -24,6 +24,8 @@ const OPENING_MAX: usize = 8;
 pub struct FleetSettings {
     /// Zenoh endpoint of the server.
     pub endpoint: String,
+    /// As [`SessionBuilder::datagrams`](crate::SessionBuilder::datagrams).
+    pub datagrams: Option<String>,
     /// Arena to join; otherwise the server is asked.
     pub arena: Option<String>,
     /// Dealt out in turn; all wander where it is empty.
@@ -48,6 +50,7 @@ impl FleetSettings {
     pub fn new(endpoint: &str) -> Self {
         Self {
             endpoint: endpoint.to_owned(),
+            datagrams: None,
             arena: None,
             scripts: vec![ScriptKind::Wander],
             tag: rand::random(),
@@ -180,6 +183,10 @@ async fn connect(settings: FleetSettings, number: usize) -> Result<(usize, Sessi
     let builder = Session::builder(&settings.endpoint, &name);
     let builder = match &settings.arena {
         Some(arena) => builder.arena(arena),
+        None => builder,
+    };
+    let builder = match &settings.datagrams {
+        Some(endpoint) => builder.datagrams(endpoint),
         None => builder,
     };
     let seeded = |conditions: ConditionerSettings| ConditionerSettings {

@@ -2,7 +2,7 @@
 
 use std::{
     collections::HashSet,
-    net::TcpListener,
+    net::{SocketAddr, TcpListener},
     sync::{
         Arc, Mutex,
         atomic::{AtomicU16, AtomicUsize, Ordering},
@@ -44,6 +44,8 @@ pub type Answer = Box<dyn Fn(&[u8]) -> Option<Vec<u8>> + Send + Sync>;
 /// The fake. Everything that it declares goes with it.
 pub struct FakeServer {
     pub endpoint: String,
+    /// Where it gives datagrams.
+    pub datagrams: SocketAddr,
     pub zenoh: zenoh::Session,
     pub description: Arc<Mutex<Description>>,
     /// How often the description was asked for.
@@ -67,7 +69,7 @@ impl FakeServer {
 
     /// Answers joins by `join`.
     pub async fn answering(join: Answer) -> Self {
-        let (zenoh, endpoint) = listen().await;
+        let (zenoh, endpoint, datagrams) = listen().await;
         let keys = Keys::new(ARENA).unwrap();
         let description = Arc::new(Mutex::new(description(EVENTS_BEFORE, &[u32::from(SLOT)])));
         let (input_sender, inputs) = mpsc::unbounded_channel();
@@ -95,7 +97,7 @@ impl FakeServer {
             answer(&zenoh, keys.status(), Box::new(move |_| Some(status.clone()))).await,
         ];
         let (inputs, live) = (AsyncMutex::new(inputs), AsyncMutex::new(live));
-        Self { endpoint, zenoh, description, described, keys, inputs, live, queryables }
+        Self { endpoint, datagrams, zenoh, description, described, keys, inputs, live, queryables }
     }
 
     /// Lets another arena answer status queries.
@@ -153,22 +155,22 @@ pub async fn put(zenoh: &zenoh::Session, key: String, bytes: Vec<u8>) {
     zenoh.put(key, bytes).congestion_control(CongestionControl::Block).await.unwrap();
 }
 
-async fn listen() -> (zenoh::Session, String) {
+async fn listen() -> (zenoh::Session, String, SocketAddr) {
     // Another process may take the port between the two steps; then the next one is tried.
     for _ in 0..20 {
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-        let endpoint = format!("tcp/127.0.0.1:{port}");
+        let (endpoint, datagrams) = (format!("tcp/127.0.0.1:{port}"), format!("udp/127.0.0.1:{port}"));
         let mut config = zenoh::Config::default();
         for (key, value) in [
             ("mode", "\"peer\"".to_owned()),
-            ("listen/endpoints", format!("[\"{endpoint}\"]")),
+            ("listen/endpoints", format!("[\"{endpoint}\", \"{datagrams}\"]")),
             ("scouting/multicast/enabled", "false".to_owned()),
             ("scouting/gossip/enabled", "false".to_owned()),
         ] {
             config.insert_json5(key, &value).unwrap();
         }
         if let Ok(zenoh) = zenoh::open(config).await {
-            return (zenoh, endpoint);
+            return (zenoh, endpoint, SocketAddr::from(([127, 0, 0, 1], port)));
         }
     }
     panic!("no free port on loopback");

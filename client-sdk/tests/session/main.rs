@@ -3,6 +3,7 @@
 
 mod bots;
 mod command_line;
+mod datagrams;
 mod ending;
 mod events;
 mod fake_server;
