@@ -169,41 +169,43 @@ impl FigureBody {
     }
 
     pub fn motion(&self, q: &[f64], v: &[f64]) -> Motion {
-        match self.dof.inertia() {
-            Inertia::Parts(parts) => {
-                let mut sum = Motion::default();
-                for (part, inertia) in (0..).zip(parts) {
-                    let frame = self.dof.frame(PartPoint { part, point: inertia.centre }, q, v);
-                    let momentum = part_momentum(&frame, inertia.mass, inertia.inertia);
-                    let (position, twist) = (DVec3::from(frame.position), frame.twist());
-                    let (linear, angular) = (DVec3::from(momentum.force), DVec3::from(momentum.torque));
-                    sum.momentum += linear;
-                    sum.angular_momentum += position.cross(linear) + angular;
-                    sum.energy += 0.5 * (linear.dot(twist.linear) + angular.dot(twist.angular));
-                    sum.moment += inertia.mass * position;
-                }
-                sum
+        motion(&*self.dof, q, v)
+    }
+}
+
+/// How a figure moves as a whole.
+pub(crate) fn motion(dof: &dyn Dof, q: &[f64], v: &[f64]) -> Motion {
+    let mut sum = Motion::default();
+    match dof.inertia() {
+        Inertia::Parts(parts) => {
+            for (part, inertia) in (0..).zip(parts) {
+                let frame = dof.frame(PartPoint { part, point: inertia.centre }, q, v);
+                let momentum = part_momentum(&frame, inertia.mass, inertia.inertia);
+                let (position, twist) = (DVec3::from(frame.position), frame.twist());
+                let (linear, angular) = (DVec3::from(momentum.force), DVec3::from(momentum.torque));
+                sum.momentum += linear;
+                sum.angular_momentum += position.cross(linear) + angular;
+                sum.energy += 0.5 * (linear.dot(twist.linear) + angular.dot(twist.angular));
+                sum.moment += inertia.mass * position;
             }
-            Inertia::Points(masses) => {
-                let point = |numbers: &[f64], i: usize| DVec3::from_slice(&numbers[3 * i..]);
-                let mut momenta: Vec<_> = masses.diagonal.iter().enumerate().map(|(i, &m)| m * point(v, i)).collect();
-                let mut moments: Vec<_> = masses.diagonal.iter().enumerate().map(|(i, &m)| m * point(q, i)).collect();
-                for &(i, j, m) in &masses.off_diagonal {
-                    let (i, j) = (i as usize, j as usize);
-                    momenta[i] += m * point(v, j);
-                    momenta[j] += m * point(v, i);
-                    moments[i] += m * point(q, j);
-                    moments[j] += m * point(q, i);
-                }
-                Motion {
-                    momentum: momenta.iter().sum(),
-                    angular_momentum: momenta.iter().enumerate().map(|(i, &p)| point(q, i).cross(p)).sum(),
-                    energy: 0.5 * momenta.iter().enumerate().map(|(i, &p)| point(v, i).dot(p)).sum::<f64>(),
-                    moment: moments.iter().sum(),
-                }
+        }
+        Inertia::Points(masses) => {
+            let point = |numbers: &[f64], i: usize| DVec3::from_slice(&numbers[3 * i..]);
+            let mut add = |i: usize, j: usize, m: f64| {
+                let (position, velocity) = (point(q, i), point(v, j));
+                sum.momentum += m * velocity;
+                sum.angular_momentum += position.cross(m * velocity);
+                sum.energy += 0.5 * m * point(v, i).dot(velocity);
+                sum.moment += m * position;
+            };
+            masses.diagonal.iter().enumerate().for_each(|(i, &m)| add(i, i, m));
+            for &(i, j, m) in &masses.off_diagonal {
+                add(i as usize, j as usize, m);
+                add(j as usize, i as usize, m);
             }
         }
     }
+    sum
 }
 
 /// Pairs of blocks that inertia and own potentials couple.

@@ -19,7 +19,7 @@ pub(crate) mod rigid_body;
 
 use glam::{DMat3, DQuat, DVec3};
 
-pub(crate) use figure::FigureBody;
+pub(crate) use figure::{FigureBody, motion};
 pub use figure::{FigureDesc, PartCollider};
 pub use frame::Frame;
 pub use interface::{

@@ -14,7 +14,7 @@ impl Problem {
     }
 
     /// Forces at the end of the tick times the ways that they went.
-    fn work_of(&self, terms: &[impl Term]) -> f64 {
+    pub(super) fn work_of(&self, terms: &[impl Term]) -> f64 {
         let work = |term| {
             let frames = self.pair(term);
             let (_, gradients) = Term::evaluate(term, self.dt, frames);

@@ -192,6 +192,11 @@ impl Figure {
         energy
     }
 
+    /// Work of its own potentials, and of what code asked to act, where it was last evaluated, J.
+    pub fn work(&self, dt: f64) -> f64 {
+        -dt * self.gradient.iter().zip(&self.v1).map(|(gradient, rate)| gradient * rate).sum::<f64>()
+    }
+
     /// M (v1 − v0 − g dt), and half its product with that difference.
     fn evaluate_points<const D: usize>(&self, masses: &PointMasses, fall: DVec3, residual: &mut [Entry<D>]) -> f64 {
         let change = |i: usize| DVec3::from_slice(&self.v1[3 * i..]) - DVec3::from_slice(&self.v0[3 * i..]) - fall;

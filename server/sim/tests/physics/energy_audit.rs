@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use pita_sim::dof::{BlockSize, Columns, Inertia, LocalState, PointMasses};
 use pita_sim::{
-    Anchor, Collider, DMat3, DVec3, Dof, DofKind, FigureDesc, Frame, JointDrive, PartPoint, PdControl, PdDesc,
-    RigidBodyDesc, Settings, Shape, SpringDesc, StaticDesc, World,
+    Anchor, BallJointDesc, Collider, DMat3, DVec3, Dof, DofKind, FigureDesc, Frame, JointDrive, PartPoint, PdControl,
+    PdDesc, RigidBodyDesc, Settings, Shape, SolverSettings, SpringDesc, StaticDesc, World,
 };
 
 use super::DT;
@@ -64,6 +64,35 @@ fn a_falling_heap_has_no_burst() {
         assert!(!report.is_energy_burst(), "tick {tick}: {report:?}");
     }
     assert!(world.report().kinetic_energy < 1.0);
+}
+
+/// Chains of cubes on ball joints, thrown at one another with far too little work allowed: what is not solved may be open
+/// and deep, but gains nothing.
+#[test]
+fn what_is_not_solved_gains_nothing() {
+    let solver = SolverSettings { budget: Some(3_000), ..SolverSettings::default() };
+    let mut world = World::new(Settings { audit_energy: true, solver, ..Settings::at(DT) }).unwrap();
+    for chain in 0..8 {
+        let side = if chain % 2 == 0 { -1.0 } else { 1.0 };
+        let velocity = DVec3::new(-15.0 * side, 0.0, 0.0);
+        let start = DVec3::new(4.0 * side, 1.2 * f64::from(chain / 2), 0.0);
+        let links = [0.0, 1.1, 2.2, 3.3].map(|x| {
+            let angular_velocity = DVec3::new(3.0, 5.0, -4.0) * side;
+            let body = RigidBodyDesc { velocity, angular_velocity, ..cube(start + DVec3::X * (x * side)) };
+            world.add_rigid_body(body).unwrap()
+        });
+        for pair in links.windows(2) {
+            let end = |body, x: f64| Anchor::body(body, DVec3::X * (x * side));
+            world.add_ball_joint(BallJointDesc::new(end(pair[0], 0.55), end(pair[1], -0.55))).unwrap();
+        }
+    }
+    let mut stopped = 0;
+    for tick in 0..90 {
+        let report = world.step();
+        stopped += report.out_of_budget_islands;
+        assert!(!report.is_energy_burst(), "tick {tick}: {report:?}");
+    }
+    assert!(stopped > 30, "{stopped} islands ran out of budget");
 }
 
 /// A point that pushes itself along, which no potential does.

@@ -159,7 +159,7 @@ impl<const D: usize> Descent<D> {
                 }
             }
         }
-        self.return_to_best(problem, &mut report);
+        self.return_to_best(problem, &mut work, &mut report);
         SolveReport { evaluations: work.evaluations(), work: work.spent(), ..report }
     }
 
@@ -336,16 +336,30 @@ impl<const D: usize> Descent<D> {
         work.vectors(VECTORS_A_TRIAL);
     }
 
-    /// One body's overflow must not spread over its island, nor a last step that went wrong.
-    fn return_to_best(&mut self, problem: &mut Problem, report: &mut SolveReport) {
+    /// One body's overflow must not spread over its island, nor a last step that went wrong. What is not the solution has
+    /// to pay for its motion.
+    fn return_to_best(&mut self, problem: &mut Problem, work: &mut Work, report: &mut SolveReport) {
         let Best { u, merit, residual, .. } = &self.best;
-        let is_there = report.stopped_because == StoppedBecause::Tolerance || *u == self.u;
-        if !is_there && merit.is_finite() {
-            problem.move_to(u);
-            problem.remember_solution(u);
-            (report.merit, report.residual) = (*merit, *residual);
-        } else {
-            problem.remember_solution(&self.u);
+        if report.stopped_because != StoppedBecause::Tolerance {
+            if merit.is_finite() {
+                self.u.clone_from(u);
+                (report.merit, report.residual) = (*merit, *residual);
+            }
+            self.pay(problem, work);
+        }
+        problem.remember_solution(&self.u);
+    }
+
+    /// Moves to `u`, and as near to rest as its energy demands.
+    fn pay(&mut self, problem: &mut Problem, work: &mut Work) {
+        problem.move_to(&self.u);
+        problem.evaluate(&mut self.residual);
+        work.moved_and_evaluated();
+        let share = problem.affordable_share();
+        if share < 1.0 {
+            self.u.iter_mut().flatten().for_each(|rate| *rate *= share);
+            problem.move_to(&self.u);
+            work.moved();
         }
     }
 }
