@@ -11,11 +11,14 @@ use std::{
 use pita_protocol::{
     WireError, decode,
     dof::Decoder,
-    message::{FATES_MAX, InputAck, InputFate, JoinAccepted, Snapshot},
+    message::{CellGrant, FATES_MAX, InputAck, InputFate, JoinAccepted, Keyframes, KeyframesWanted, Snapshot},
 };
 
 use crate::{
+    bodies::{Bodies, Source},
+    cell_inbox::{CellInbox, Taken},
     input_clock::InputClock,
+    line::Line,
     snapshot::ReceivedSnapshot,
     statistics::Statistics,
     tick_clock::TickClock,
@@ -43,6 +46,8 @@ pub struct Inbox {
     /// For the interpolation buffer, newest last; empty where nobody interpolates.
     recent: VecDeque<Arc<ReceivedSnapshot>>,
     recent_max: usize,
+    /// The newest snapshot, where somebody interpolates.
+    last: Option<Arc<ReceivedSnapshot>>,
     /// For the clock of what is shown, with the snapshots: how late, and when, s.
     lateness: VecDeque<(f64, f64)>,
     /// Sequence numbers that were sent and not acknowledged, with the time of their send.
@@ -51,6 +56,9 @@ pub struct Inbox {
     counted: u32,
     statistics: Statistics,
     decoder: Decoder,
+    cells: CellInbox,
+    line: Line,
+    bodies: Bodies,
     tick_hz: f64,
 }
 
@@ -66,11 +74,15 @@ impl Inbox {
             newest: (accepted.description.tick, now),
             recent: VecDeque::new(),
             recent_max,
+            last: None,
             lateness: VecDeque::new(),
             in_flight: VecDeque::new(),
             counted: 0,
             statistics: Statistics::default(),
             decoder: Decoder::default(),
+            cells: CellInbox::default(),
+            line: Line::default(),
+            bodies: Bodies::default(),
             tick_hz: f64::from(accepted.tick_hz),
         }
     }
@@ -78,7 +90,7 @@ impl Inbox {
     /// Takes a snapshot message, and answers the snapshot where it is the newest.
     pub fn take_snapshot(&mut self, bytes: &[u8], now: Instant) -> Option<Arc<ReceivedSnapshot>> {
         self.statistics.received_bytes += bytes.len() as u64;
-        let head = match decode::<Snapshot>(bytes) {
+        let mut head = match decode::<Snapshot>(bytes) {
             Ok(head) if head.epoch != self.epoch => {
                 self.statistics.snapshots_foreign += 1;
                 return None;
@@ -90,8 +102,7 @@ impl Inbox {
             }
         };
         let frame = match self.decoder.decode(head.tick, &head.dof) {
-            // Of each body the newest state that is known, where this is the newest snapshot.
-            Ok(frame) => self.decoder.view().filter(|view| view.tick() == frame.tick()).map_or(frame, Arc::clone),
+            Ok(frame) => frame,
             Err(error) => {
                 self.statistics.malformed += 1;
                 if error == WireError::Desync {
@@ -108,18 +119,64 @@ impl Inbox {
         self.acknowledged(&head.ack, now);
         self.note_lateness(&head, arrival, now);
         self.follow_clock(&head, now);
-        let snapshot = Arc::new(ReceivedSnapshot::new(head, frame, self.tick_hz, now));
-        if self.recent_max > 0 {
-            if self.recent.len() == self.recent_max {
-                self.recent.pop_front();
-            }
-            self.recent.push_back(Arc::clone(&snapshot));
+        if let Some(granted) = head.cells.take() {
+            let lost = self.cells.grant(head.tick, granted);
+            lost.into_iter().flatten().for_each(|cell| self.bodies.forget(cell));
         }
+        let layers = self.cells.granted().iter().map(|grant| grant.layers).max().unwrap_or(0);
+        self.line.observe(head.tick, self.seconds(now), 1.0 / self.tick_hz, layers);
+        self.bodies.take(Source::Own, &frame, &[], |_| false);
         if arrival == Arrival::Late {
             return None;
         }
+        let bodies = self.bodies.gather(head.tick);
+        let snapshot = Arc::new(ReceivedSnapshot::new(head, bodies, self.tick_hz, now));
         self.newest = (snapshot.tick(), now);
+        self.last = (self.recent_max > 0).then(|| Arc::clone(&snapshot));
+        self.keep(Arc::clone(&snapshot));
         Some(snapshot)
+    }
+
+    /// Takes a message of a cell. What comes later than the session's own snapshot of that tick is added to it. Answers
+    /// whether a keyframe is missing.
+    pub fn take_cell(&mut self, bytes: &[u8]) -> bool {
+        self.statistics.received_bytes += bytes.len() as u64;
+        match self.cells.take(bytes) {
+            Ok(Taken::Frame(cell, frame, departures)) => {
+                self.statistics.cells_received += 1;
+                self.bodies.take(Source::Cell(cell), &frame, &departures, |to| self.cells.is_taken(to));
+                self.refresh(frame.tick());
+                return self.cells.is_lost(cell);
+            }
+            Ok(Taken::Unreadable) => self.statistics.cells_unreadable += 1,
+            Ok(Taken::Foreign) => return false,
+            Err(_) => self.statistics.malformed += 1,
+        }
+        true
+    }
+
+    /// Takes keyframes that were asked for.
+    pub fn take_keyframes(&mut self, answer: &Keyframes) {
+        match self.cells.take_keyframes(answer) {
+            Ok((frames, count)) => {
+                self.statistics.keyframes_fetched += count as u64;
+                for (cell, frame) in frames {
+                    self.bodies.take(Source::Cell(cell), &frame, &[], |_| false);
+                }
+            }
+            Err(_) => self.statistics.malformed += 1,
+        }
+    }
+
+    /// Changes where others cells or layers are to be taken: when the server said which, and how many layers less of each.
+    pub fn cells_version(&self) -> (u64, u8) {
+        (self.cells.granted_at(), self.line.layers(u8::MAX))
+    }
+
+    /// The cells that the session takes, as granted and as far as the line allows, and the keyframes that it lacks of them.
+    pub fn cells_to_do(&self) -> (Vec<CellGrant>, Vec<KeyframesWanted>) {
+        let taken = |grant: &CellGrant| CellGrant { layers: self.line.layers(grant.layers), ..*grant };
+        (self.cells.granted().iter().map(taken).collect(), self.cells.wanted())
     }
 
     /// Fractional tick whose input is due at `now`; `None` before the first snapshot.
@@ -224,6 +281,26 @@ impl Inbox {
         let elapsed_s = now.saturating_duration_since(since).as_secs_f64();
         let allowed_s = 2.0 * elapsed_s + AHEAD_MAX_S;
         tick.saturating_sub(newest) as f64 * self.clock.period_s() <= allowed_s
+    }
+
+    /// Keeps `snapshot` for interpolation, instead of what there was of its tick.
+    fn keep(&mut self, snapshot: Arc<ReceivedSnapshot>) {
+        self.recent.pop_back_if(|last| last.tick() == snapshot.tick());
+        if self.recent_max == 0 {
+            return;
+        }
+        if self.recent.len() == self.recent_max {
+            self.recent.pop_front();
+        }
+        self.recent.push_back(snapshot);
+    }
+
+    /// Something of `tick` arrived after the newest snapshot: it is shown with that.
+    fn refresh(&mut self, tick: u64) {
+        if let Some(last) = self.last.clone().filter(|last| self.recent_max > 0 && tick <= last.tick()) {
+            let bodies = self.bodies.gather(last.tick());
+            self.keep(Arc::new(last.again(bodies)));
+        }
     }
 
     fn acknowledged(&mut self, ack: &InputAck, now: Instant) {
@@ -331,7 +408,7 @@ mod tests {
         (0..FATES_MAX).for_each(|behind| ack.fates.set(behind, InputFate::Applied { late_ticks: 0 }));
         let state = State::new(Precision::default()).unwrap();
         let dof = Encoder::default().encode(tick, &state, &[]);
-        encode(&Snapshot { epoch: EPOCH, tick, ack, event_sequence: 0, dof })
+        encode(&Snapshot { epoch: EPOCH, tick, ack, event_sequence: 0, cells: None, dof })
     }
 
     #[test]
@@ -342,7 +419,7 @@ mod tests {
         assert_eq!(answered, [Some(101), Some(103), None, None, Some(104)]);
         let counts = inbox.statistics();
         assert_eq!((counts.snapshots_received, counts.snapshots_missed, counts.snapshots_stale), (4, 0, 1));
-        assert_eq!(inbox.drain_recent().iter().map(|s| s.tick()).collect::<Vec<_>>(), [101, 103, 102, 104]);
+        assert_eq!(inbox.drain_recent().iter().map(|s| s.tick()).collect::<Vec<_>>(), [101, 103, 104]);
         assert!(inbox.drain_recent().is_empty());
     }
 

@@ -70,17 +70,20 @@ impl InterpolationBuffer {
         }
     }
 
-    /// Puts a frame in its place. A tick that is there already, or older than everything in a full buffer, is dropped.
+    /// Puts a frame in its place, instead of what is known of its tick. What is older than everything in a full buffer is
+    /// dropped.
     pub fn insert(&mut self, frame: Frame) {
         let place = self.frames.partition_point(|f| f.tick < frame.tick);
         let full = self.frames.len() == self.frames_max;
-        let repeated = self.frames.get(place).is_some_and(|f| f.tick == frame.tick);
-        if repeated || (full && place == 0) {
-            return;
-        }
-        self.frames.insert(place, frame);
-        if full {
-            self.frames.pop_front();
+        match self.frames.get_mut(place) {
+            Some(known) if known.tick == frame.tick => *known = frame,
+            _ if full && place == 0 => {}
+            _ => {
+                self.frames.insert(place, frame);
+                if full {
+                    self.frames.pop_front();
+                }
+            }
         }
     }
 
@@ -123,7 +126,9 @@ impl InterpolationBuffer {
             }
             Some(_) => from.clone(),
             None => {
-                let ticks = (tick - from.tick as f64).clamp(0.0, self.extrapolation_max_ticks);
+                // Back, too: a cell may be ahead of the snapshot with which it is shown.
+                let most = self.extrapolation_max_ticks;
+                let ticks = (tick - from.tick as f64).clamp(-most, most);
                 carried_on(from, (ticks * self.period_s) as f32)
             }
         }
@@ -142,6 +147,28 @@ fn interpolated(a: &Slice, b: &Slice, t: f32) -> Slice {
     }
     // Q' is constant within a tick, and it is the later state's Q' that led there.
     Slice { q, v: b.v.clone(), ..a.clone() }
+}
+
+/// Q' that leads from one state of a slice to a later one, a tick being `period_s`; `None` where they are not that.
+pub(crate) fn rates_between(from: &Slice, to: &Slice, period_s: f64) -> Option<Vec<f32>> {
+    let components: usize = to.groups.iter().map(|group| group.components()).sum();
+    if from.groups != to.groups || to.tick <= from.tick || to.v.len() != components {
+        return None;
+    }
+    let seconds = ((to.tick - from.tick) as f64 * period_s) as f32;
+    let mut rates = Vec::with_capacity(components);
+    for (group, at, _) in places(to) {
+        let (a, b) = (from.q.get(at..at + group.numbers())?, to.q.get(at..at + group.numbers())?);
+        if group == Group::Rotation {
+            let turn = rotation(b) * rotation(a).inverse();
+            // The shorter way.
+            let turn = if turn.w < 0.0 { -turn } else { turn };
+            rates.extend((turn.to_scaled_axis() / seconds).to_array());
+        } else {
+            rates.extend(a.iter().zip(b).map(|(a, b)| (b - a) / seconds));
+        }
+    }
+    Some(rates)
 }
 
 fn carried_on(slice: &Slice, seconds: f32) -> Slice {

@@ -22,6 +22,7 @@ use crate::{
     error::ClientError,
     interpolation::{InterpolationBuffer, Playback},
     keeper::{self, EVENTS_MAX, Incoming, Keeper},
+    looking::Looking,
     session::Session,
     shared::{Interpolation, Shared},
     transport,
@@ -86,6 +87,7 @@ pub async fn join(
         _token: declare_alive(zenoh, &keys, &accepted).await?,
     };
     let wire = Arc::new(Wire::open(zenoh, &keys, &accepted, Arc::clone(&shared), wanted.conditioner).await?);
+    let looking = Looking::new(zenoh.clone(), keys.clone(), Arc::clone(&shared), wanted.conditioner);
     let silent_otherwise = wanted.role == Role::Spectator;
     let keeper = Keeper {
         zenoh: zenoh.clone(),
@@ -99,8 +101,8 @@ pub async fn join(
         shared: Arc::clone(&shared),
         wire: Arc::clone(&wire),
     };
-    let keeper = tokio::spawn(keeper.run(incoming));
-    Ok(Session::new(zenoh.clone(), accepted, shared, wire, keeper, declared))
+    let tasks = [tokio::spawn(keeper.run(incoming)), tokio::spawn(looking.run())];
+    Ok(Session::new(zenoh.clone(), accepted, shared, wire, tasks, declared))
 }
 
 /// The one arena that answers.

@@ -12,8 +12,10 @@
 #![doc = include_str!("../examples/drive.rs")]
 //! ```
 
+mod bodies;
 pub mod bots;
 mod builder;
+mod cell_inbox;
 mod conditioner;
 mod datagrams;
 mod error;
@@ -23,7 +25,9 @@ mod input_clock;
 mod interpolation;
 mod join;
 mod keeper;
+mod line;
 mod lock;
+mod looking;
 mod mount;
 mod outbox;
 #[cfg(feature = "prediction")]

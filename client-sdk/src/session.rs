@@ -52,7 +52,8 @@ pub struct Session {
     shared: Arc<Shared>,
     wire: Arc<Wire>,
     next: tokio::sync::Mutex<NewestReceiver>,
-    keeper: JoinHandle<()>,
+    /// The keeper, and who looks after cells.
+    tasks: [JoinHandle<()>; 2],
     _declared: Declared,
 }
 
@@ -75,11 +76,11 @@ impl Session {
         accepted: JoinAccepted,
         shared: Arc<Shared>,
         wire: Arc<Wire>,
-        keeper: JoinHandle<()>,
+        tasks: [JoinHandle<()>; 2],
         declared: Declared,
     ) -> Self {
         let next = tokio::sync::Mutex::new(shared.watch_newest());
-        Self { zenoh, accepted, shared, wire, next, keeper, _declared: declared }
+        Self { zenoh, accepted, shared, wire, next, tasks, _declared: declared }
     }
 
     /// Number of the session's place on the server.
@@ -252,6 +253,6 @@ impl Session {
 
 impl Drop for Session {
     fn drop(&mut self) {
-        self.keeper.abort();
+        self.tasks.iter().for_each(JoinHandle::abort);
     }
 }

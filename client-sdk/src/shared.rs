@@ -8,7 +8,7 @@ use std::{
 #[cfg(feature = "prediction")]
 use pita_protocol::message::Controls;
 use pita_protocol::message::JoinAccepted;
-use tokio::sync::watch;
+use tokio::sync::{Notify, watch};
 
 #[cfg(feature = "prediction")]
 use crate::prediction::{Predictor, body_state};
@@ -39,6 +39,8 @@ pub type NewestReceiver = watch::Receiver<Option<Arc<ReceivedSnapshot>>>;
 pub struct Shared {
     pub inbox: Mutex<Inbox>,
     pub events: EventQueue,
+    /// Told where other cells may be taken, or keyframes are missing.
+    pub cells_changed: Notify,
     roster: Mutex<Arc<Roster>>,
     newest: watch::Sender<Option<Arc<ReceivedSnapshot>>>,
     end: watch::Sender<Option<SessionEnd>>,
@@ -52,6 +54,7 @@ impl Shared {
         Self {
             inbox: Mutex::new(Inbox::new(accepted, recent_max, Instant::now())),
             events: EventQueue::default(),
+            cells_changed: Notify::new(),
             roster: Mutex::new(Arc::new(Roster::new(&accepted.description))),
             newest: watch::Sender::new(None),
             end: watch::Sender::new(None),
@@ -62,7 +65,16 @@ impl Shared {
     }
 
     pub fn take_snapshot(&self, bytes: &[u8], now: Instant) {
-        let Some(snapshot) = lock(&self.inbox).take_snapshot(bytes, now) else { return };
+        let (snapshot, is_changed) = {
+            let mut inbox = lock(&self.inbox);
+            let before = inbox.cells_version();
+            let snapshot = inbox.take_snapshot(bytes, now);
+            (snapshot, inbox.cells_version() != before)
+        };
+        if is_changed {
+            self.cells_changed.notify_one();
+        }
+        let Some(snapshot) = snapshot else { return };
         self.newest.send_if_modified(|newest| {
             // Another thread of Zenoh may have come in between with a newer one.
             let is_newer = newest.as_ref().is_none_or(|newest| newest.tick() < snapshot.tick());
@@ -71,6 +83,12 @@ impl Shared {
             }
             is_newer
         });
+    }
+
+    pub fn take_cell(&self, bytes: &[u8]) {
+        if lock(&self.inbox).take_cell(bytes) {
+            self.cells_changed.notify_one();
+        }
     }
 
     pub fn newest(&self) -> Option<Arc<ReceivedSnapshot>> {

@@ -1,25 +1,27 @@
 //! A snapshot as it was received, decoded.
 
-use std::{sync::Arc, time::Instant};
+use std::time::Instant;
 
 use pita_protocol::{
-    dof::{self, Slice},
+    dof::Slice,
     message::{InputAck, Snapshot},
 };
 
-/// State of all slices after one tick. Numbers are made of it when they are asked for: whoever wants one slice, or none
+use crate::bodies::Gathered;
+
+/// State of all slices after one tick, as far as it has arrived: of each the newest, by its own [tick](Slice::tick). Numbers are made of it when they are asked for: whoever wants one slice, or none
 /// of a snapshot, does not pay for all.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct ReceivedSnapshot {
     head: Snapshot,
-    frame: Arc<dof::Frame>,
+    bodies: Gathered,
     tick_hz: f64,
     received: Instant,
 }
 
 impl ReceivedSnapshot {
-    pub(crate) fn new(head: Snapshot, frame: Arc<dof::Frame>, tick_hz: f64, received: Instant) -> Self {
-        Self { head, frame, tick_hz, received }
+    pub(crate) fn new(head: Snapshot, bodies: Gathered, tick_hz: f64, received: Instant) -> Self {
+        Self { head, bodies, tick_hz, received }
     }
 
     /// Tick whose end this is.
@@ -42,13 +44,20 @@ impl ReceivedSnapshot {
         self.received
     }
 
+    /// The same with what has arrived since.
+    pub(crate) fn again(&self, bodies: Gathered) -> Self {
+        Self { bodies, ..self.clone() }
+    }
+
     /// All slices, in order of id.
     pub fn slices(&self) -> Vec<Slice> {
-        self.frame.slices(self.tick_hz)
+        self.bodies.bodies.iter().filter_map(|body| self.bodies.slice(body, self.tick_hz)).collect()
     }
 
     /// Those slices whose ids are in `wanted`, in its order; ids that the snapshot lacks are left out.
     pub fn select(&self, wanted: &[u32]) -> Vec<Slice> {
-        wanted.iter().filter_map(|&id| self.frame.slice(id, self.tick_hz)).collect()
+        let bodies = &self.bodies.bodies;
+        let find = |wanted: &u32| Some(&bodies[bodies.binary_search_by_key(wanted, |place| place.id).ok()?]);
+        wanted.iter().filter_map(find).filter_map(|body| self.bodies.slice(body, self.tick_hz)).collect()
     }
 }

@@ -27,6 +27,12 @@ pub struct Statistics {
     pub snapshots_stale: u64,
     /// Snapshots for another session of the same slot.
     pub snapshots_foreign: u64,
+    /// Snapshots of cells.
+    pub cells_received: u64,
+    /// Snapshots of cells that came to nothing, because a keyframe before them had not arrived.
+    pub cells_unreadable: u64,
+    /// Keyframes of cells that were asked for, by newcomers and after a loss.
+    pub keyframes_fetched: u64,
     /// Events that were new.
     pub events_received: u64,
     /// Events that were announced and did not arrive; the roster was read again after each gap.
@@ -66,6 +72,9 @@ impl Default for Statistics {
             snapshots_missed: 0,
             snapshots_stale: 0,
             snapshots_foreign: 0,
+            cells_received: 0,
+            cells_unreadable: 0,
+            keyframes_fetched: 0,
             events_received: 0,
             events_missed: 0,
             malformed: 0,
@@ -114,12 +123,15 @@ impl Statistics {
         [&mut self.latency_us, &mut self.jitter_us, &mut self.lead_us, &mut self.correction_um]
     }
 
-    fn counts(&mut self) -> [&mut u64; 15] {
+    fn counts(&mut self) -> [&mut u64; 18] {
         [
             &mut self.snapshots_received,
             &mut self.snapshots_missed,
             &mut self.snapshots_stale,
             &mut self.snapshots_foreign,
+            &mut self.cells_received,
+            &mut self.cells_unreadable,
+            &mut self.keyframes_fetched,
             &mut self.events_received,
             &mut self.events_missed,
             &mut self.malformed,

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use pita_protocol::{Message, WireError, message::Snapshot};
+use pita_protocol::{Message, WireError, message::Keyframes};
 use tokio::{sync::mpsc, time::timeout};
 use zenoh::{Config, query::Reply};
 
@@ -14,7 +14,7 @@ const LEASE_MS: u32 = 5_000;
 
 /// Longest message that the transport collects before anybody looks at it, bytes: the longest of the protocol and room
 /// for the transport's own. Zenoh's default is 1 GiB.
-const MESSAGE_MAX: usize = Snapshot::MAX_BYTES + (64 << 10);
+const MESSAGE_MAX: usize = Keyframes::MAX_BYTES + (64 << 10);
 
 /// Most answers to one question that are looked at.
 const ANSWERS_MAX: usize = 16;

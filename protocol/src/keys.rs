@@ -10,11 +10,14 @@
 //! pita/<arena>/input/<slot>       put by the client: sealed InputPacket
 //! pita/<arena>/say/<slot>         query: sealed SayRequest -> SayReply
 //! pita/<arena>/snapshot/<slot>    put by the server: Snapshot
+//! pita/<arena>/cell/<x>/<z>/<layer>  put by the server: CellSnapshot
+//! pita/<arena>/keyframes          query: KeyframesRequest -> Keyframes
 //! pita/<arena>/event              put by the server: EventMessage
 //! pita/<arena>/live/<slot>/<epoch>  liveliness token of a session
 //! ```
 
 use crate::WireError;
+use crate::cell::CellId;
 
 /// Longest arena name, bytes.
 pub const ARENA_NAME_MAX: usize = 32;
@@ -106,6 +109,22 @@ impl Keys {
         self.of("snapshot/*")
     }
 
+    /// Put by the server: [`CellSnapshot`](crate::message::CellSnapshot)s of one layer of a cell.
+    pub fn cell(&self, cell: CellId, layer: u8) -> String {
+        self.of(&format!("cell/{}/{}/{layer}", cell.x, cell.z))
+    }
+
+    /// All cells, for the server's access rules.
+    pub fn all_cells(&self) -> String {
+        self.of("cell/*/*/*")
+    }
+
+    /// Query: a [`KeyframesRequest`](crate::message::KeyframesRequest) is answered by
+    /// [`Keyframes`](crate::message::Keyframes).
+    pub fn keyframes(&self) -> String {
+        self.of("keyframes")
+    }
+
     /// Put by the server: [`EventMessage`](crate::message::EventMessage).
     pub fn event(&self) -> String {
         self.of("event")
@@ -166,6 +185,8 @@ mod tests {
         let keys = Keys::new("proving-ground").unwrap();
         assert_eq!(keys.slot_of_input(&keys.input(65535)), Some(65535));
         assert_eq!(keys.session_of_live(&keys.live(3, 77)), Some((3, 77)));
+        let cell = CellId { x: -7, z: 12 };
+        assert_eq!(keys.cell(cell, 2), "pita/proving-ground/cell/-7/12/2");
         assert_eq!(arena_of(&keys.join()), Some("proving-ground"));
     }
 

@@ -5,6 +5,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::cell::check_grants;
+pub use crate::cell::{
+    CellGrant, CellId, CellKeyframes, CellSnapshot, Departure, GRANTS_MAX, Keyframe, Keyframes, KeyframesRequest,
+    KeyframesWanted, LAYERS_MAX,
+};
 pub use crate::chat::{CHAT_MAX, SayRefusal, SayReply, SayRequest};
 use crate::codec::{Message, WireError, require};
 pub use crate::description::{
@@ -168,16 +173,18 @@ pub struct Snapshot {
     pub ack: InputAck,
     /// Number of the last event before this snapshot.
     pub event_sequence: u32,
-    /// All DOF, a snapshot of the session's stream; see [`dof`](crate::dof).
+    /// The cells that the session may take from now on, in order; `None` where that is known to have arrived.
+    pub cells: Option<Vec<CellGrant>>,
+    /// The session's own actor, a snapshot of the session's stream; see [`dof`](crate::dof).
     #[serde(with = "bytes")]
     pub dof: Vec<u8>,
 }
 
 impl Message for Snapshot {
     const KIND: u8 = 5;
-    const MAX_BYTES: usize = 4 << 20;
+    const MAX_BYTES: usize = 1 << 20;
     fn validate(&self) -> Result<(), WireError> {
-        Ok(())
+        self.cells.as_deref().map_or(Ok(()), check_grants)
     }
 }
 
@@ -519,7 +526,7 @@ impl Message for TickRecords {
 }
 
 /// `Vec<u8>` as one run of bytes instead of a sequence of numbers.
-mod bytes {
+pub(crate) mod bytes {
     use serde::{Deserializer, Serializer, de::Visitor};
 
     pub fn serialize<S: Serializer>(bytes: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
@@ -564,7 +571,14 @@ mod tests {
     fn messages_round_trip() {
         assert_eq!(decode(&encode(&join("Wu"))), Ok(join("Wu")));
         assert_eq!(decode(&encode(&packet(0.5))), Ok(packet(0.5)));
-        let snapshot = Snapshot { epoch: 9, tick: 1, ack: InputAck::default(), event_sequence: 2, dof: vec![1, 2, 3] };
+        let snapshot = Snapshot {
+            epoch: 9,
+            tick: 1,
+            ack: InputAck::default(),
+            event_sequence: 2,
+            cells: Some(vec![CellGrant { cell: CellId { x: -1, z: 2 }, layers: 3 }]),
+            dof: vec![1, 2, 3],
+        };
         assert_eq!(decode(&encode(&snapshot)), Ok(snapshot));
     }
 
@@ -615,7 +629,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..600), kind in 1u8..10) {
+        fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..600), kind in 1u8..16) {
             let mut framed = vec![PROTOCOL_VERSION as u8, kind];
             framed.extend(&bytes);
             let _ = decode::<JoinRequest>(&framed);
@@ -626,6 +640,8 @@ mod tests {
             let _ = decode::<EventMessage>(&framed);
             let _ = decode::<Status>(&framed);
             let _ = decode::<TickRecords>(&framed);
+            let _ = decode::<CellSnapshot>(&framed);
+            let _ = decode::<Keyframes>(&framed);
         }
     }
 }

@@ -11,7 +11,8 @@ use std::sync::mpsc::{self, Receiver, Sender};
 
 use pita_protocol::admin::{AdminReply, AdminRequest, CHALLENGE_BYTES};
 use pita_protocol::message::{
-    Description, JoinAccepted, JoinReply, JoinRequest, Refusal, Role, SayRefusal, SayReply, SayRequest, TicksRequest,
+    Description, JoinAccepted, JoinReply, JoinRequest, Keyframes, KeyframesRequest, Refusal, Role, SayRefusal,
+    SayReply, SayRequest, TicksRequest,
 };
 use pita_protocol::seal::{self, SessionKey, TAG_BYTES};
 use pita_protocol::{Message, PROTOCOL_VERSION, WireError};
@@ -44,6 +45,8 @@ pub enum Question {
     Ticks,
     /// What only those may ask who run the server.
     Admin,
+    /// What leads to the present keyframe of a cell.
+    Keyframes,
 }
 
 /// What the answering thread does next.
@@ -140,6 +143,13 @@ impl Answering {
             Question::Describe => reply(shared, &query, shared.keys.describe(), &*shared.description()),
             Question::Source => reply(shared, &query, shared.keys.source(), &*shared.source()),
             Question::Status => reply(shared, &query, shared.keys.status(), &metrics::status(shared)),
+            Question::Keyframes => match payload(&query) {
+                Ok(request) => reply(shared, &query, shared.keys.keyframes(), &keyframes(shared, &request)),
+                Err(error) => {
+                    shared.counters.query_malformed.add(1);
+                    reply_error(shared, &query, &error.to_string());
+                }
+            },
             Question::Ticks => match payload::<TicksRequest>(&query) {
                 Ok(request) => {
                     let records = shared.metrics().records_since(request.since);
@@ -305,6 +315,15 @@ fn new_secrets() -> Result<Secrets, rand::rngs::SysError> {
     let mut key = [0; 32];
     rand::rngs::SysRng.try_fill_bytes(&mut key)?;
     Ok(Secrets { epoch: rand::rngs::SysRng.try_next_u32()?, key: SessionKey(key) })
+}
+
+/// What leads from the keyframes that the asker has to the present ones.
+fn keyframes(shared: &Shared, request: &KeyframesRequest) -> Keyframes {
+    let mut answer = Keyframes::default();
+    for &wanted in &request.cells {
+        answer.push(wanted, shared.keyframes(wanted.cell).as_deref().unwrap_or_default());
+    }
+    answer
 }
 
 /// Decodes what `query` carries; nothing at all is malformed.

@@ -8,10 +8,10 @@ mod within;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use pita_protocol::dof::{Precision, STEPS_MAX};
+use pita_protocol::dof::{Cadence, Precision, STEPS_MAX};
 use serde::Deserialize;
 
-pub use within::{TickRate, Within};
+pub use within::{KeyframeTicks, TickRate, Within};
 
 /// The defaults, and the documentation of every key.
 pub const DEFAULT_TEXT: &str = include_str!("../../configs/server.toml");
@@ -31,6 +31,8 @@ pub struct ServerConfig {
     pub tick: Tick,
     /// How fine the state is sent.
     pub precision: PrecisionSteps,
+    /// How the world is divided for those who look at it.
+    pub cells: CellSettings,
     /// Slots and timeouts.
     pub sessions: SessionLimits,
     /// Who stays out.
@@ -134,6 +136,33 @@ impl From<PrecisionSteps> for Precision {
     fn from(steps: PrecisionSteps) -> Self {
         let (point, rotation) = (steps.steps_per_m.get(), steps.rotation_steps.get());
         Self { point, rotation, scalar: steps.joint_steps.get(), ..Self::default() }
+    }
+}
+
+/// `[cells]`
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CellSettings {
+    /// Side of a cell, m.
+    pub side_m: Within<8, 4096>,
+    /// Most that one cell takes, bytes/s.
+    pub bytes_per_s: Within<1_000, 10_000_000>,
+    /// Ticks from one keyframe to the next.
+    pub keyframe_ticks: KeyframeTicks,
+    /// Keyframes after which a cell begins anew.
+    pub epoch_keyframes: Within<1, 100>,
+}
+
+impl CellSettings {
+    /// For cells of a world of `tick_hz`.
+    pub fn at(self, tick_hz: u16) -> crate::cells::Settings {
+        let epoch_keyframes = self.epoch_keyframes.get() as usize;
+        crate::cells::Settings {
+            side_m: self.side_m.get() as f32,
+            cadence: Cadence { keyframe_ticks_log2: self.keyframe_ticks.log2(), epoch_keyframes },
+            bytes_per_s: self.bytes_per_s.get(),
+            tick_hz,
+        }
     }
 }
 
@@ -286,7 +315,8 @@ mod tests {
 
     /// What is compiled in is what the wire takes where nothing is said.
     #[test]
-    fn the_default_precision_is_the_protocols() {
+    fn the_default_precision_and_cadence_are_the_protocols() {
+        assert_eq!(ServerConfig::built_in().cells.at(30).cadence, Cadence::default());
         assert_eq!(Precision::from(ServerConfig::built_in().precision), Precision::default());
     }
 
@@ -315,6 +345,7 @@ mod tests {
             ("tick = 3", &["my.toml", "tick", "3"]),
             ("[network]\nlisten = 'localhost'", &["network.listen", "localhost", "tcp/"]),
             ("[network]\ndatagrams = 'tcp/127.0.0.1:1'", &["my.toml", "network.datagrams", "tcp/127.0.0.1:1", "udp/"]),
+            ("[cells]\nkeyframe_ticks = 6", &["cells.keyframe_ticks", "6", "1, 2, 4, 8, 16 or 32"]),
             ("[tick]\ntick_hz =", &["my.toml", "line 2"]),
         ] {
             let said = refusal(text);

@@ -1,14 +1,14 @@
 //! Who is in the world, for those who choose whom to send: bodies that belong together, where they are, what they matter.
 //!
-//! Made once a tick from a frame, in the order of the state that is coded, and read by the selection of every session.
+//! Made once a tick from a frame, in the order of the state that is coded; cells and own actors are made of it.
 
 /// Bodies of an actor that are sent together; a body of no actor is a family of its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Family {
     /// Id of its first body.
     pub root: u32,
-    /// Where that is, m; the origin for a game's own kinds, whose numbers may be anything.
-    pub position: [f32; 3],
+    /// Where that is, m; nowhere for a game's own kinds, whose numbers may be anything.
+    pub position: Option<[f32; 3]>,
     /// How fast, m/s.
     pub speed: f32,
     /// Factor that the actor sets: [`Actor::relevance`](pita_game::Actor::relevance).

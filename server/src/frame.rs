@@ -202,8 +202,8 @@ impl Dof {
     fn family(&self, head: &SliceHead) -> Family {
         let actor = self.actors.binary_search_by_key(&head.id, |actor| actor.root).ok().map(|at| self.actors[at]);
         let position = match head.groups.of(&self.layouts)[0] {
-            Group::Point => [0, 1, 2].map(|i| self.q(head)[i] as f32),
-            _ => [0.0; 3],
+            Group::Point => Some([0, 1, 2].map(|i| self.q(head)[i] as f32)),
+            _ => None,
         };
         Family {
             root: head.id,
@@ -342,8 +342,8 @@ mod tests {
         let mut state = State::new(Precision::default()).unwrap();
         dof.quantise(&mut state, &mut crowd);
         assert_eq!(crowd.of_bodies(), [0, 0, 0, 1]);
-        let car = Family { root: 4, position: [10.0, 2.0, 3.0], speed: 5.0, importance: 2.0, slot: Some(7) };
-        let clock = Family { root: 11, position: [0.0; 3], speed: 0.0, importance: 1.0, slot: None };
+        let car = Family { root: 4, position: Some([10.0, 2.0, 3.0]), speed: 5.0, importance: 2.0, slot: Some(7) };
+        let clock = Family { root: 11, position: None, speed: 0.0, importance: 1.0, slot: None };
         assert_eq!(crowd.families(), [car, clock]);
         let bodies: Vec<_> = state.bodies().iter().map(|body| (body.id, body.parent)).collect();
         assert_eq!(bodies, [(4, None), (5, None), (9, Some(4)), (11, None)]);

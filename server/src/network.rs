@@ -230,6 +230,7 @@ fn access_rules(keys: &Keys) -> serde_json::Value {
         keys.status(),
         keys.ticks(),
         keys.admin(),
+        keys.keyframes(),
         ANY_JOIN.to_owned(),
         ANY_STATUS.to_owned(),
     ];
@@ -255,7 +256,7 @@ fn access_rules(keys: &Keys) -> serde_json::Value {
         "rules": [
             allow("inputs", "ingress", &["put"], &[keys.all_inputs()]),
             allow("questions", "ingress", &["query"], &questions),
-            allow("listening", "ingress", &["declare_subscriber"], &[keys.all_snapshots(), keys.event()]),
+            allow("listening", "ingress", &["declare_subscriber"], &[keys.all_snapshots(), keys.all_cells(), keys.event()]),
             allow("tokens", "ingress", &["liveliness_token"], &[keys.all_live()]),
             allow("server", "egress", &everything, &["**".to_owned()]),
         ],
@@ -271,6 +272,7 @@ fn access_rules(keys: &Keys) -> serde_json::Value {
 mod tests {
     use super::*;
     use crate::config::ServerConfig;
+    use pita_protocol::message::CellId;
     use std::time::Duration;
     use zenoh::Wait;
 
@@ -310,7 +312,7 @@ mod tests {
         let answer = |query: zenoh::query::Query| drop(query.reply("pita/a/status", "").wait());
         server.declare_queryable(keys.status()).callback(answer).background().await.unwrap();
         let all = async {
-            for key in [keys.snapshot(3), keys.event()] {
+            for key in [keys.snapshot(3), keys.cell(CellId { x: -1, z: 4 }, 2), keys.event()] {
                 assert_eq!(first_heard(&server, &endpoint, &key).await, b"server", "{key}");
             }
         };

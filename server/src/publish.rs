@@ -1,10 +1,11 @@
 //! The publishing thread: everything that leaves for clients without being asked for.
 //!
-//! Owns the declared publishers, one for each session and one for events, the numbering of events and the description
-//! that they add up to. It wakes for every frame, quantises the state once, and puts one snapshot for each session, of what its
-//! [selection](crate::selection) takes. Nothing
-//! here waits for a client: snapshots and events are dropped where a connection takes no more.
+//! Owns the declared publishers, one for each session, one for each layer of a [cell](crate::cells) and one for events, the
+//! numbering of events and the description that they add up to. It wakes for every frame, quantises the state once, codes
+//! and puts each cell once for everybody, and then for each session its own snapshot. Nothing here waits for a client:
+//! cells, snapshots and events are dropped where a connection takes no more.
 
+mod cell_outlets;
 mod outlet;
 
 use std::collections::{BTreeMap, VecDeque};
@@ -12,18 +13,19 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use pita_game::ArenaEvent;
-use pita_protocol::dof::{Encoder, State};
-use pita_protocol::message::{Description, Event, EventMessage, InputAck, Role, Snapshot};
+use pita_protocol::dof::State;
+use pita_protocol::message::{Description, Event, EventMessage, Role};
 
 use crate::answers::{Asker, Work};
 use crate::boarding::{Boarding, Ledger, Out};
+use crate::cells::{self, Cells, Head, OwnStream};
 use crate::crowd::Crowd;
 use crate::description;
 use crate::frame::Frame;
 use crate::metrics::Traffic;
-use crate::selection::Selection;
 use crate::sessions::{Change, EndReason, SessionId};
 use crate::shared::{Phase, Shared};
+use cell_outlets::CellOutlets;
 use outlet::Outlet;
 
 /// How long the thread sleeps where nothing wakes it; sessions time out meanwhile.
@@ -33,8 +35,7 @@ const IDLE: Duration = Duration::from_millis(100);
 struct Feed {
     id: SessionId,
     outlet: Outlet,
-    encoder: Encoder,
-    selection: Selection,
+    own: OwnStream,
 }
 
 /// The thread's state.
@@ -50,8 +51,9 @@ pub struct Publishing {
     changes: Vec<Change>,
     description: Arc<Description>,
     tick: u64,
-    snapshot: Snapshot,
-    /// The newest frame in steps, once for all sessions.
+    cells: Cells,
+    cell_outlets: CellOutlets,
+    /// The newest frame in steps.
     state: State,
     /// And who that is.
     crowd: Crowd,
@@ -59,17 +61,24 @@ pub struct Publishing {
 }
 
 impl Publishing {
-    /// Declares the event publisher.
+    /// Declares the event publisher; the world is divided as `cells` says.
     ///
     /// # Errors
     /// What Zenoh says.
-    pub fn new(shared: Arc<Shared>, session: zenoh::Session, asker: Asker) -> zenoh::Result<Self> {
+    pub fn new(
+        shared: Arc<Shared>,
+        session: zenoh::Session,
+        asker: Asker,
+        cells: cells::Settings,
+    ) -> zenoh::Result<Self> {
         let slots = shared.sessions().slots();
         Ok(Self {
             events: Outlet::for_events(&session, shared.keys.event())?,
             ledger: Ledger::new(slots),
             description: shared.description(),
             state: State::new(shared.description().precision)?,
+            cells: Cells::new(cells),
+            cell_outlets: CellOutlets::new(shared.clone(), session.clone()),
             shared,
             session,
             asker,
@@ -78,7 +87,6 @@ impl Publishing {
             boarding: VecDeque::new(),
             changes: Vec::new(),
             tick: 0,
-            snapshot: Snapshot { epoch: 0, tick: 0, ack: InputAck::default(), event_sequence: 0, dof: Vec::new() },
             has_said_closing: false,
         })
     }
@@ -128,8 +136,9 @@ impl Publishing {
     fn begin_session(&mut self, id: SessionId, role: Role, name: String, bytes_per_s: u32) {
         match Outlet::for_snapshots(&self.session, self.shared.keys.snapshot(id.slot)) {
             Ok(outlet) => {
-                let selection = Selection::new(bytes_per_s, self.shared.tick_hz);
-                self.feeds.insert(id.slot, Feed { id, outlet, encoder: Encoder::default(), selection });
+                let precision = *self.state.precision();
+                let own = OwnStream::new(precision, bytes_per_s, self.shared.tick_hz);
+                self.feeds.insert(id.slot, Feed { id, outlet, own });
             }
             Err(reason) => tracing::error!("no publisher for slot {}: {reason}", id.slot),
         }
@@ -145,8 +154,8 @@ impl Publishing {
 
     /// The arena notices nothing: the car is there, or on its way.
     fn resume_session(&mut self, from: SessionId, to: SessionId) {
-        if let Some(Feed { id, .. }) = self.feeds.get_mut(&to.slot) {
-            *id = to;
+        if let Some(feed) = self.feeds.get_mut(&to.slot) {
+            feed.id = to;
         }
         // Whoever still waits for the earlier join waits for nothing.
         self.asker.tell(Work::Ended(from, EndReason::Resumed));
@@ -236,33 +245,42 @@ impl Publishing {
         self.events.put(bytes);
     }
 
-    /// The state for every session, coded against what it acknowledged.
+    /// The cells once for everybody, and for every session its own actor, coded against what it acknowledged.
     fn publish_snapshots(&mut self, frame: &mut Frame) {
         if self.feeds.is_empty() {
-            return;
+            self.cells.clear();
+            return self.cell_outlets.publish(&self.cells);
         }
         frame.quantise(&mut self.state, &mut self.crowd);
-        self.snapshot.tick = frame.tick;
-        self.snapshot.event_sequence = self.description.event_sequence;
+        self.cells.tick(frame.tick, &self.state, &self.crowd);
+        self.cell_outlets.publish(&self.cells);
+        self.find_own();
         for feed in self.feeds.values_mut() {
-            let id = feed.id;
-            match self.shared.sessions().acknowledged(id) {
-                (0, _) => feed.encoder.restart(),
-                (tick, before) => {
-                    feed.encoder.acknowledge(tick, before);
-                    feed.selection.acknowledge(tick);
-                }
-            }
-            let chosen = feed.selection.choose(&mut feed.encoder, frame.tick, &self.state, &self.crowd, id.slot);
-            self.snapshot.dof = feed.encoder.encode(frame.tick, &self.state, chosen);
             // Acknowledgements are in order of slot.
-            let found = frame.acks.binary_search_by_key(&id.slot, |(acked, _)| acked.slot).map(|at| frame.acks[at]);
-            self.snapshot.ack = found.ok().filter(|(acked, _)| *acked == id).map(|(_, ack)| ack).unwrap_or_default();
-            self.snapshot.epoch = id.epoch;
-            let bytes = pita_protocol::encode(&self.snapshot);
-            feed.selection.sent(bytes.len(), &feed.encoder);
-            self.shared.counters.sent_bytes.add(bytes.len() as u64);
+            let found =
+                frame.acks.binary_search_by_key(&feed.id.slot, |(acked, _)| acked.slot).map(|at| frame.acks[at]);
+            let ack = found.ok().filter(|(acked, _)| *acked == feed.id).map(|(_, ack)| ack).unwrap_or_default();
+            let head = Head {
+                epoch: feed.id.epoch,
+                tick: frame.tick,
+                ack,
+                event_sequence: self.description.event_sequence,
+                acknowledged: self.shared.sessions().acknowledged(feed.id),
+            };
+            let (bytes, of_cells) = feed.own.snapshot(&head, &self.cells);
+            self.shared.counters.sent_bytes.add((bytes.len() + of_cells) as u64);
             feed.outlet.put(bytes);
+        }
+    }
+
+    /// Hands every session the bodies that it drives.
+    fn find_own(&mut self) {
+        self.feeds.values_mut().for_each(|feed| feed.own.clear());
+        for (body, &family) in self.state.bodies().iter().zip(self.crowd.of_bodies()) {
+            let family = &self.crowd.families()[family as usize];
+            if let Some(feed) = family.slot.and_then(|slot| self.feeds.get_mut(&slot)) {
+                feed.own.add(&self.state, body, family);
+            }
         }
     }
 

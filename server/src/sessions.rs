@@ -12,7 +12,7 @@ use pita_protocol::chat;
 use pita_protocol::message::{InputFrame, InputPacket, ResumeProof, Role, SayRefusal, SayRequest};
 use pita_protocol::seal::{self, SessionKey};
 
-use crate::selection::LEAST_BYTES_PER_S;
+use crate::cells::LEAST_BYTES_PER_S;
 
 /// Limits of the state machine. Both kinds of slots together are at most `u16::MAX`.
 #[derive(Clone, Copy, Debug)]

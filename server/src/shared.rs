@@ -4,6 +4,7 @@
 //! the counters and [`Shared::phase`]. The locks belong to the network's threads, the publishing thread and the
 //! answering thread; nobody holds one while talking to Zenoh.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::Thread;
@@ -11,7 +12,7 @@ use std::thread::Thread;
 use crossbeam_queue::ArrayQueue;
 use pita_game::Reload;
 use pita_protocol::Keys;
-use pita_protocol::message::{ArenaSource, Description};
+use pita_protocol::message::{ArenaSource, CellId, Description, Keyframe};
 
 use crate::boarding::Boarding;
 use crate::counters::Counters;
@@ -45,6 +46,7 @@ pub struct Shared {
     metrics: Mutex<Metrics>,
     description: Mutex<Arc<Description>>,
     source: Mutex<Arc<ArenaSource>>,
+    keyframes: Mutex<BTreeMap<CellId, Arc<[Keyframe]>>>,
     publisher: OnceLock<Thread>,
     phase: AtomicU8,
 }
@@ -102,6 +104,7 @@ impl Shared {
             metrics: Mutex::new(Metrics::new(start.tick_hz)),
             description: Mutex::new(Arc::new(start.description)),
             source: Mutex::new(Arc::new(start.source)),
+            keyframes: Mutex::new(BTreeMap::new()),
             publisher: OnceLock::new(),
             phase: AtomicU8::new(Phase::Running as u8),
         }
@@ -135,6 +138,20 @@ impl Shared {
     /// Replaces [`Shared::source`].
     pub fn set_source(&self, source: ArenaSource) {
         *lock(&self.source) = Arc::new(source);
+    }
+
+    /// What leads to the present keyframe of `cell`. Not for the tick thread.
+    pub fn keyframes(&self, cell: CellId) -> Option<Arc<[Keyframe]>> {
+        lock(&self.keyframes).get(&cell).cloned()
+    }
+
+    /// Replaces [`Shared::keyframes`]; a cell without any is no more.
+    pub fn set_keyframes(&self, cell: CellId, keyframes: &[Keyframe]) {
+        let mut all = lock(&self.keyframes);
+        match keyframes {
+            [] => all.remove(&cell),
+            some => all.insert(cell, some.into()),
+        };
     }
 
     /// The calling thread is the one that [`Shared::wake_publisher`] wakes.

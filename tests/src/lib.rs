@@ -6,6 +6,7 @@ pub mod bench;
 pub mod loadtest;
 pub mod observer;
 pub mod process;
+pub mod relay;
 pub mod server_process;
 pub mod table;
 pub mod yardstick;

@@ -1,8 +1,8 @@
 //! A bad network on demand: delays, loses, repeats, reorders, throttles and freezes what a session sends and receives.
 //!
-//! It stands between a session and Zenoh and treats each message as a datagram of its own: inputs up, snapshots down.
-//! Events come down in order and none is lost: a loss delays them and what follows, as a stream does that sends again.
-//! Joining and other questions are not touched. Everything random follows from a seed.
+//! It stands between a session and Zenoh and treats each message as a datagram of its own: inputs up, snapshots down,
+//! those of cells too. Events come down in order and none is lost: a loss delays them and what follows, as a stream does
+//! that sends again. Questions for keyframes take as long as the way there and back; joining and others are not touched. Everything random follows from a seed.
 
 mod link;
 mod schedule;

@@ -42,7 +42,7 @@ pub fn run_world(server: Arc<FakeServer>, slots: u16, step: f32) -> tokio::task:
             for slot in SLOT..SLOT + slots {
                 let dof = fake_server::car(10 * u32::from(slot), tick, (tick - 100) as f64 * f64::from(step));
                 let ack = ack((tick - 101) as u32, tick);
-                let snapshot = Snapshot { epoch: EPOCH, tick, ack, event_sequence: EVENTS_BEFORE, dof };
+                let snapshot = Snapshot { epoch: EPOCH, tick, ack, event_sequence: EVENTS_BEFORE, cells: None, dof };
                 let key = format!("pita/{}/snapshot/{slot}", fake_server::ARENA);
                 fake_server::put(&server.zenoh, key, encode(&snapshot)).await;
             }

@@ -235,7 +235,14 @@ pub fn actor(id: u32) -> ActorDescription {
 /// The own car of the first session at `x = tick − 100` m.
 pub fn snapshot(tick: u64) -> Snapshot {
     let x = tick as f64 - 100.0;
-    Snapshot { epoch: EPOCH, tick, ack: InputAck::default(), event_sequence: EVENTS_BEFORE, dof: car(ROOT, tick, x) }
+    Snapshot {
+        epoch: EPOCH,
+        tick,
+        ack: InputAck::default(),
+        event_sequence: EVENTS_BEFORE,
+        cells: None,
+        dof: car(ROOT, tick, x),
+    }
 }
 
 /// One rigid body at `x`, 30 m/s fast along it, in a snapshot that needs nothing before it.

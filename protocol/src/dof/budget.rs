@@ -1,4 +1,4 @@
-//! How much a receiver is sent: a budget that fills with every tick, and what bodies are likely to take of it.
+//! How much a stream may take: a budget that fills with every tick, and what bodies are likely to take of it.
 //!
 //! Pure. Costs are learnt from what was coded. Nothing is sent twice to fit: a snapshot that took more than its share is
 //! paid back by the next ones, so that the budget holds on average, and nothing waits in a queue.
@@ -47,24 +47,14 @@ pub struct Spent {
 
 /// Ticks of saving at most: what is left over by quiet ticks is there for the next burst.
 const SAVED_TICKS_MAX: f64 = 8.0;
-/// A snapshot that is acknowledged later than this, s, says that the connection takes less than the budget. A round trip of
-/// 300 ms with jitter and loss stays below.
-const LATE_S: f64 = 0.8;
-/// Share of the budget that a connection is given back with every tick in which it keeps up, and that is left of it with
-/// every tick in which it does not.
-const GIVEN_BACK: f64 = 0.01;
-const LEFT: f64 = 0.9;
 /// Weight of a new observation of a cost.
 const LEARNT: f64 = 0.1;
 
-/// The budget of one receiver.
+/// The budget of one stream.
 #[derive(Clone, Debug)]
 pub struct Budget {
     tick_hz: f64,
     bytes_per_tick: f64,
-    least_per_tick: f64,
-    /// Part of the budget that the connection takes, 0 to 1.
-    share: f64,
     /// Bytes; negative where the last snapshots took too much.
     saved: f64,
     /// Bytes a group.
@@ -75,24 +65,18 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// `bytes_per_s` over a good connection, and never less than `least_per_s`.
-    pub fn new(bytes_per_s: u32, least_per_s: u32, tick_hz: u16) -> Self {
+    /// `bytes_per_s` on average.
+    pub fn new(bytes_per_s: u32, tick_hz: u16) -> Self {
         let tick_hz = f64::from(tick_hz.max(1));
         let bytes_per_tick = f64::from(bytes_per_s) / tick_hz;
-        let least_per_tick = f64::from(least_per_s.min(bytes_per_s)) / tick_hz;
-        let saved = bytes_per_tick;
         // As a first guess; a tick or two of snapshots say better.
         let (first, update, overhead) = (6.0, 2.5, 48.0);
-        Self { tick_hz, bytes_per_tick, least_per_tick, share: 1.0, saved, first, update, overhead }
+        Self { tick_hz, bytes_per_tick, saved: bytes_per_tick, first, update, overhead }
     }
 
-    /// A tick goes by; the newest snapshot that is acknowledged was sent `behind` ticks ago.
-    pub fn fill(&mut self, behind: u64) {
-        let is_late = behind as f64 > LATE_S * self.tick_hz;
-        self.share = if is_late { self.share * LEFT } else { (self.share + GIVEN_BACK).min(1.0) };
-        let fill = (self.bytes_per_tick * self.share).max(self.least_per_tick);
-        self.share = fill / self.bytes_per_tick.max(1.0);
-        self.saved = (self.saved + fill).min(fill * SAVED_TICKS_MAX);
+    /// A tick goes by.
+    pub fn fill(&mut self) {
+        self.saved = (self.saved + self.bytes_per_tick).min(self.bytes_per_tick * SAVED_TICKS_MAX);
     }
 
     /// Bytes that bodies of the coming snapshot may take.
@@ -128,10 +112,10 @@ mod tests {
     use super::*;
 
     /// Sends what there is room for, at a true cost that the budget has to learn. Answers bytes a second.
-    fn sent_per_s(budget: &mut Budget, behind: u64, ticks: usize) -> f64 {
+    fn sent_per_s(budget: &mut Budget, ticks: usize) -> f64 {
         let mut sent = 0;
         for _ in 0..ticks {
-            budget.fill(behind);
+            budget.fill();
             let groups = (budget.room() / budget.estimate(Need::Update { groups: 1 })).max(0.0) as usize;
             let updates = Cost { groups, bytes: groups * 4 };
             budget.spend(updates.bytes + 60, &Spent { updates, ..Spent::default() });
@@ -143,18 +127,9 @@ mod tests {
     #[test]
     fn it_holds_on_average_whatever_bodies_cost() {
         for bytes_per_s in [8_000, 64_000, 1_000_000] {
-            let mut budget = Budget::new(bytes_per_s, 8_000, 30);
-            let rate = sent_per_s(&mut budget, 3, 300) / f64::from(bytes_per_s);
+            let mut budget = Budget::new(bytes_per_s, 30);
+            let rate = sent_per_s(&mut budget, 300) / f64::from(bytes_per_s);
             assert!((0.9..1.04).contains(&rate), "{rate} of {bytes_per_s}");
         }
-    }
-
-    #[test]
-    fn a_connection_that_falls_behind_gets_less_and_then_more_again() {
-        let mut budget = Budget::new(64_000, 8_000, 30);
-        sent_per_s(&mut budget, 60, 60);
-        assert!((7_000.0..9_000.0).contains(&sent_per_s(&mut budget, 60, 150)));
-        sent_per_s(&mut budget, 4, 150);
-        assert!(sent_per_s(&mut budget, 4, 150) > 60_000.0);
     }
 }

@@ -69,12 +69,7 @@ impl State {
         layout: &[Group],
         numbers: &[f64],
     ) -> Result<(), WireError> {
-        require(self.bodies.last().is_none_or(|last| last.id < id), "slice id", "ascending")?;
-        require(id < u32::MAX, "slice id", "below 2^32 - 1")?;
-        require(parent.is_none_or(|parent| self.find(parent).is_some()), "parent", "an earlier body")?;
-        require(self.bodies.len() < BODIES_MAX, "bodies", "at most 16384")?;
-        require(self.groups.len() + layout.len() <= GROUPS_MAX, "groups", "at most 65536")?;
-        require((1..=BODY_GROUPS_MAX).contains(&layout.len()), "groups of a body", "1 to 4096")?;
+        self.check_room(id, parent, layout.len())?;
         let count: usize = layout.iter().map(|group| group.numbers()).sum();
         require(numbers.len() == count, "numbers of a body", "as many as its layout says")?;
         let (start, groups) = (self.groups.len() as u32, layout.len() as u16);
@@ -86,6 +81,29 @@ impl State {
         }
         self.bodies.push(Body { id, kind, parent, start, groups });
         Ok(())
+    }
+
+    /// Appends a body of another state of the same precision.
+    ///
+    /// # Errors
+    /// As [`State::push`].
+    pub fn push_copy(&mut self, from: &Self, body: &Body) -> Result<(), WireError> {
+        let groups = from.groups(body);
+        self.check_room(body.id, body.parent, groups.len())?;
+        let start = self.groups.len() as u32;
+        self.groups.extend_from_slice(groups);
+        self.bodies.push(Body { start, ..*body });
+        Ok(())
+    }
+
+    /// Whether a body may come next.
+    fn check_room(&self, id: u32, parent: Option<u32>, groups: usize) -> Result<(), WireError> {
+        require(self.bodies.last().is_none_or(|last| last.id < id), "slice id", "ascending")?;
+        require(id < u32::MAX, "slice id", "below 2^32 - 1")?;
+        require(parent.is_none_or(|parent| self.find(parent).is_some()), "parent", "an earlier body")?;
+        require(self.bodies.len() < BODIES_MAX, "bodies", "at most 16384")?;
+        require(self.groups.len() + groups <= GROUPS_MAX, "groups", "at most 65536")?;
+        require((1..=BODY_GROUPS_MAX).contains(&groups), "groups of a body", "1 to 4096")
     }
 
     /// All bodies, in order of id.

@@ -32,7 +32,7 @@ mod tests;
 mod walk;
 
 pub use budget::{Budget, Cost, Need, Spent};
-pub use cells::{Cadence, CellEncoder};
+pub use cells::{Cadence, CellDecoder, CellEncoder, Coded, Due};
 pub use frame::{BODIES_MAX, BODY_GROUPS_MAX, Body, Frame, GROUPS_MAX, State};
 pub use predict::GroupState;
 pub use priority::{Priorities, Relevance};

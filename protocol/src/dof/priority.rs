@@ -1,14 +1,11 @@
 //! Who is sent when not everybody fits: priorities that add up until a body's turn comes.
 
-/// What a body's weight is made of. All of it is the sender's choice; receivers know nothing of it.
+/// What a body's weight is made of. All of it is the sender's choice; receivers know nothing of it. Who is near is a matter
+/// of which cells a receiver takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relevance {
-    /// From the receiver's own body, m.
-    pub distance: f32,
     /// m/s.
     pub speed: f32,
-    /// Whether it is the receiver's own.
-    pub is_own: bool,
     /// Factor that the game sets; 1 is the rule, 0 never.
     pub importance: f32,
 }
@@ -16,17 +13,14 @@ pub struct Relevance {
 impl Relevance {
     /// How much priority a tick of waiting is worth.
     pub fn weight(&self) -> f32 {
-        // The own body outweighs everything else together.
-        let own = if self.is_own { 1e6 } else { 1.0 };
-        // What is 20 m away counts half of what is near, and what rests a tenth of what drives at 10 m/s.
-        let near = 20.0 / (20.0 + self.distance.max(0.0));
+        // What rests counts a tenth of what drives at 10 m/s.
         let fast = (1.0 + self.speed.max(0.0)) / 11.0;
-        let weight = own * near * fast.clamp(0.1, 2.0) * self.importance;
+        let weight = fast.clamp(0.1, 2.0) * self.importance;
         if weight.is_finite() { weight.max(0.0) } else { 0.0 }
     }
 }
 
-/// Priorities of one receiver.
+/// Priorities of one stream.
 #[derive(Clone, Debug, Default)]
 pub struct Priorities {
     /// In order of id.
@@ -66,9 +60,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn everybody_gets_a_turn_and_the_near_and_fast_more_of_them() {
-        let relevance = |distance, speed| Relevance { distance, speed, is_own: false, importance: 1.0 };
-        let bodies = [relevance(0.0, 10.0), relevance(100.0, 10.0), relevance(100.0, 0.0)];
+    fn everybody_gets_a_turn_and_the_fast_and_important_more_of_them() {
+        let relevance = |speed, importance| Relevance { speed, importance };
+        let bodies = [relevance(10.0, 1.0), relevance(10.0, 0.3), relevance(0.0, 0.3)];
         let (mut priorities, mut turns) = (Priorities::default(), [0; 3]);
         for _ in 0..1000 {
             priorities.wait((0..).zip(bodies));
@@ -82,7 +76,7 @@ mod tests {
 
     #[test]
     fn nonsense_weighs_nothing() {
-        let wild = Relevance { distance: f32::NAN, speed: f32::INFINITY, is_own: true, importance: f32::NAN };
+        let wild = Relevance { speed: f32::INFINITY, importance: f32::NAN };
         assert_eq!(wild.weight(), 0.0);
     }
 }

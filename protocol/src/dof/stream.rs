@@ -11,7 +11,7 @@
 //!
 //! An [`Encoder`] codes against nothing that was not acknowledged. So a lost, late or repeated snapshot harms no other.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::ans::{self, Coder};
@@ -129,6 +129,12 @@ impl Encoder {
         &self.spent
     }
 
+    /// What the snapshot of `tick` was found to be coded against by [`Encoder::needs`].
+    pub(super) fn baseline(&self, tick: u64) -> Option<&Frame> {
+        let newest = self.known(tick).next().map(|sent| &sent.frame);
+        self.merged.as_ref().map(|(_, merged)| merged).or(newest)
+    }
+
     /// Snapshots that the receiver has, newest first.
     fn known(&self, tick: u64) -> impl Iterator<Item = &Sent> {
         self.sent.iter().rev().filter(move |sent| sent.is_had && tick - sent.frame.tick <= AGE_MAX)
@@ -223,17 +229,6 @@ fn encode_against(
 pub struct Decoder {
     /// Oldest first.
     had: VecDeque<Arc<Frame>>,
-    view: Option<Arc<Frame>>,
-    /// Bodies of the view that newer snapshots do not know, with the first of those.
-    unheard: BTreeMap<u32, u64>,
-}
-
-/// Ticks after which a body of the view goes of which newer snapshots know nothing.
-const UNHEARD_MAX: u64 = 2 * HISTORY as u64;
-
-/// Bodies of `base` that are not in `next`, in order.
-fn gone(base: &Frame, next: &Frame) -> Vec<u32> {
-    base.bodies.iter().map(|body| body.id).filter(|&id| next.find(id).is_none()).collect()
 }
 
 impl Decoder {
@@ -281,40 +276,18 @@ impl Decoder {
         if !coder.is_finished() || next.check() != check {
             return Err(WireError::Desync);
         }
-        let gone = if partial { gone(base, &next) } else { Vec::new() };
-        let frame = self.keep(next);
-        self.look(&frame, partial, &gone);
-        Ok(frame)
+        Ok(self.keep(next))
     }
 
-    /// All that is known as of the newest snapshot: of each body its newest state, whichever snapshot brought it.
-    pub fn view(&self) -> Option<&Arc<Frame>> {
-        self.view.as_ref()
+    /// How many frames it keeps.
+    #[cfg(test)]
+    pub(super) fn remembered(&self) -> usize {
+        self.had.len()
     }
 
-    /// Takes over into the view what the snapshot `frame` says. Bodies that it does not know stay in the view for as long
-    /// as it may be coded against an older one: it may not have heard of them yet.
-    fn look(&mut self, frame: &Arc<Frame>, partial: bool, gone: &[u32]) {
-        if self.view.as_ref().is_some_and(|view| view.tick >= frame.tick) {
-            return;
-        }
-        let is_gone = |id: u32| gone.binary_search(&id).is_ok();
-        self.unheard.retain(|id, _| frame.find(*id).is_none() && !is_gone(*id));
-        self.view = match self.view.take() {
-            Some(view) if partial => {
-                for (body, _) in view.bodies().filter(|(body, _)| frame.find(body.id).is_none()) {
-                    self.unheard.entry(body.id).or_insert(frame.tick);
-                }
-                let is_fresh = |id: u32| {
-                    let since = self.unheard.get(&id).copied().unwrap_or(frame.tick);
-                    !is_gone(id) && frame.tick - since < UNHEARD_MAX
-                };
-                Some(Arc::new(frame.merged(&view, is_fresh)))
-            }
-            _ => Some(Arc::clone(frame)),
-        };
-        let view = self.view.as_ref();
-        self.unheard.retain(|id, _| view.is_some_and(|view| view.find(*id).is_some()));
+    /// Forgets the frames of the ticks that `wanted` does not want.
+    pub(super) fn retain(&mut self, wanted: impl Fn(u64) -> bool) {
+        self.had.retain(|frame| wanted(frame.tick));
     }
 
     /// The newest frame.

@@ -83,3 +83,34 @@ impl<'de> Deserialize<'de> for TickRate {
         deserializer.deserialize_i64(Rate)
     }
 }
+
+/// Ticks from one keyframe of a cell to the next: a power of two, because layers of a cell each halve the rate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KeyframeTicks {
+    log2: u8,
+}
+
+impl KeyframeTicks {
+    /// The power.
+    pub fn log2(self) -> u8 {
+        self.log2
+    }
+}
+
+impl<'de> Deserialize<'de> for KeyframeTicks {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Power;
+        impl Visitor<'_> for Power {
+            type Value = KeyframeTicks;
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("1, 2, 4, 8, 16 or 32")
+            }
+            fn visit_i64<E: Error>(self, ticks: i64) -> Result<KeyframeTicks, E> {
+                let log2 = (0..6).find(|log2| 1 << log2 == ticks);
+                log2.map(|log2| KeyframeTicks { log2 })
+                    .ok_or_else(|| E::invalid_value(Unexpected::Signed(ticks), &self))
+            }
+        }
+        deserializer.deserialize_i64(Power)
+    }
+}

@@ -54,7 +54,8 @@ impl Serving {
     ) -> Result<Self, DaemonError> {
         let (ordering, orders) = channel(ORDERS_MAX);
         let (answering, asker) = Answering::new(shared.clone(), doorkeeper, ordering);
-        let publishing = Publishing::new(shared.clone(), session.clone(), asker.clone())?;
+        let publishing =
+            Publishing::new(shared.clone(), session.clone(), asker.clone(), config.cells.at(shared.tick_hz))?;
         let (ending, ended) = unbounded_channel();
         let mut threads = vec![
             spawn("answering", &ending, move || answering.run())?,
@@ -100,6 +101,7 @@ fn declare(shared: &Arc<Shared>, session: &zenoh::Session, asker: &Asker) -> zen
         (keys.admin(), Question::Admin),
         (keys.join(), Question::Join),
         (keys.all_says(), Question::Say),
+        (keys.keyframes(), Question::Keyframes),
     ] {
         let asker = asker.clone();
         session.declare_queryable(key).callback(move |query| asker.ask(question, query)).background().wait()?;

@@ -19,6 +19,15 @@ impl Outlet {
         Self::declare(session, key, true)
     }
 
+    /// Declares the publisher of one layer of a cell on `key`. Cells of one tick share a batch with the snapshots behind them,
+    /// for the reason that events do.
+    ///
+    /// # Errors
+    /// What Zenoh says.
+    pub fn for_cells(session: &zenoh::Session, key: String) -> zenoh::Result<Self> {
+        Self::declare(session, key, false)
+    }
+
     /// Declares the publisher of events on `key`. Events of one tick share a batch: each in its own, a dozen of them
     /// (eight players leave at once) overflow the queues of healthy clients.
     ///

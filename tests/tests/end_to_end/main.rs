@@ -5,6 +5,7 @@
 
 mod bad_network;
 mod budget;
+mod cells;
 mod chat;
 mod clients;
 mod daemon;

@@ -9,7 +9,10 @@ use pita_protocol::{
 };
 
 use super::*;
-use crate::{ReceivedSnapshot, Roster};
+use crate::{
+    ReceivedSnapshot, Roster,
+    bodies::{Bodies, Source},
+};
 
 const DT: f32 = 1.0 / 30.0;
 const WHEELBASE: f32 = 2.6;
@@ -72,8 +75,10 @@ fn snapshot(tick: u64, cars: &[Car]) -> ReceivedSnapshot {
     }
     let dof = Encoder::default().encode(tick, &state, &[]);
     let frame = Decoder::default().decode(tick, &dof).unwrap();
-    let head = Snapshot { epoch: 0, tick, ack: InputAck::default(), event_sequence: 0, dof };
-    ReceivedSnapshot::new(head, frame, 30.0, Instant::now())
+    let head = Snapshot { epoch: 0, tick, ack: InputAck::default(), event_sequence: 0, cells: None, dof };
+    let mut bodies = Bodies::default();
+    bodies.take(Source::Own, &frame, &[], |_| false);
+    ReceivedSnapshot::new(head, bodies.gather(tick), 30.0, Instant::now())
 }
 
 /// Lets every car be driven for `ticks` and shows each state to `watch`.

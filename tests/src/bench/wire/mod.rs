@@ -10,6 +10,7 @@ mod stopwatch;
 mod stream;
 mod trace;
 
+use pita_server::config::ServerConfig;
 use serde_json::json;
 
 use super::{EntryError, Options, Report};
@@ -122,14 +123,20 @@ fn arena(trace: &Trace, report: &mut Report) -> Result<(), EntryError> {
     compare("  off in motion", "arena64_motion_error_mm", "mm", 20.0, clean.motion.0, Some(lossy.motion.0));
     let decode = [&mut clean, &mut lossy].map(|cost| median(&mut cost.decode_us));
     compare("  decoding a snapshot", "decode_us", "µs", 50.0, decode[0], Some(decode[1]));
-    let served = fan_out::run(trace)?;
-    compare("  encoding for 200 clients", "encode200_ms", "ms", 2.0, served.encode_ms, None);
-    report.notes.push(format!(
-        "200 clients: the cell once for all, {:.0} bytes a tick, and each client's own car, {:.1} bytes",
-        served.cell_bytes, served.own_bytes
-    ));
-    let cell = served.cell_bytes * f64::from(trace.tick_hz) / 1e3;
-    report.figures.insert("arena64_cell_kBps".to_owned(), json!(cell));
+    let side_m = ServerConfig::built_in().cells.side_m.get() as f32;
+    let served = fan_out::run(trace, side_m)?;
+    compare("  publishing for 200 clients", "encode200_ms", "ms", 2.0, served.encode_ms, None);
+    for side_m in [side_m, 32.0, 128.0, 4096.0] {
+        let served = fan_out::run(trace, side_m)?;
+        let [cells, client] =
+            [served.cell_bytes, served.client_bytes].map(|bytes| bytes * f64::from(trace.tick_hz) / 1e3);
+        report.notes.push(format!(
+            "200 clients, cells of {side_m} m: {} of them, {cells:.1} kB/s in all, each client's own snapshot {:.1} bytes a \
+             tick, a client with its cells {client:.1} kB/s, {:.2} ms of the publishing thread a tick",
+            served.cells, served.own_bytes, served.encode_ms
+        ));
+        report.figures.insert(format!("arena64_client_{side_m}m_kBps"), json!(client));
+    }
     Ok(())
 }
 

@@ -1,0 +1,208 @@
+//! The cells that a session may take: what arrives of them, and what is missing to read it.
+//!
+//! Pure, and bounded by what a session may take.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use pita_protocol::{
+    WireError, decode,
+    dof::{CellDecoder, Frame},
+    message::{CellGrant, CellId, CellSnapshot, Departure, Keyframes, KeyframesWanted},
+};
+
+/// What arrived.
+#[derive(Debug)]
+pub enum Taken {
+    /// The cell as of a tick.
+    Frame(CellId, Arc<Frame>, Vec<Departure>),
+    /// Not to be read for want of a keyframe, which is [wanted](CellInbox::wanted) now.
+    Unreadable,
+    /// Of a cell that is not taken any more.
+    Foreign,
+}
+
+/// Receiving side of cells.
+#[derive(Debug, Default)]
+pub struct CellInbox {
+    granted: Vec<CellGrant>,
+    /// Tick at which that was said.
+    granted_at: u64,
+    cells: BTreeMap<CellId, Reading>,
+}
+
+#[derive(Debug)]
+struct Reading {
+    decoder: CellDecoder,
+    /// Whether a keyframe is missing.
+    is_lost: bool,
+}
+
+impl CellInbox {
+    /// The session may take these cells, and no others, as of `tick`. Answers those that it took before and lost; `None`
+    /// where that was known, or is old.
+    pub fn grant(&mut self, tick: u64, granted: Vec<CellGrant>) -> Option<Vec<CellId>> {
+        if tick <= self.granted_at || granted == self.granted {
+            return None;
+        }
+        (self.granted, self.granted_at) = (granted, tick);
+        let granted = &self.granted;
+        let is_granted = |cell: &CellId| granted.binary_search_by_key(cell, |grant| grant.cell).is_ok();
+        let lost = self.cells.extract_if(.., |cell, _| !is_granted(cell)).map(|(cell, _)| cell).collect();
+        for grant in granted {
+            self.cells.entry(grant.cell).or_insert_with(|| Reading { decoder: CellDecoder::default(), is_lost: true });
+        }
+        Some(lost)
+    }
+
+    /// Tick at which that was said last.
+    pub fn granted_at(&self) -> u64 {
+        self.granted_at
+    }
+
+    /// The cells that the session may take, in order.
+    pub fn granted(&self) -> &[CellGrant] {
+        &self.granted
+    }
+
+    /// Whether the session takes `cell`.
+    pub fn is_taken(&self, cell: CellId) -> bool {
+        self.cells.contains_key(&cell)
+    }
+
+    /// Whether a keyframe of `cell` is missing.
+    pub fn is_lost(&self, cell: CellId) -> bool {
+        self.cells.get(&cell).is_some_and(|reading| reading.is_lost)
+    }
+
+    /// Keyframes that are missing.
+    pub fn wanted(&self) -> Vec<KeyframesWanted> {
+        let lost = self.cells.iter().filter(|(_, reading)| reading.is_lost);
+        let wanted = |(&cell, reading): (&CellId, &Reading)| KeyframesWanted {
+            cell,
+            have: reading.decoder.keyframe().unwrap_or(0),
+        };
+        lost.map(wanted).collect()
+    }
+
+    /// Takes a message on a cell's key.
+    ///
+    /// # Errors
+    /// [`WireError`] for what no server sends.
+    pub fn take(&mut self, bytes: &[u8]) -> Result<Taken, WireError> {
+        let CellSnapshot { cell, tick, keyframe_age, departures, dof } = decode(bytes)?;
+        let Some(reading) = self.cells.get_mut(&cell) else { return Ok(Taken::Foreign) };
+        match reading.decode(tick, &dof, keyframe_age == 0) {
+            Ok(frame) => {
+                // Snapshots to come will be coded against it.
+                reading.is_lost = !reading.decoder.has(tick.saturating_sub(keyframe_age.into()));
+                Ok(Taken::Frame(cell, frame, departures))
+            }
+            Err(WireError::NoBaseline) => Ok(Taken::Unreadable),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Takes an answer to what was asked for; answers what the cells are like then, and how many keyframes that were.
+    ///
+    /// # Errors
+    /// [`WireError`] for what no server sends.
+    pub fn take_keyframes(&mut self, answer: &Keyframes) -> Result<(Vec<(CellId, Arc<Frame>)>, usize), WireError> {
+        let (mut frames, mut count) = (Vec::new(), 0);
+        for of_cell in &answer.cells {
+            let Some(reading) = self.cells.get_mut(&of_cell.cell) else { continue };
+            // Where there is nothing, or nothing newer, the stream itself says the rest.
+            reading.is_lost = false;
+            let mut newest = None;
+            for keyframe in &of_cell.keyframes {
+                newest = Some(reading.decode(keyframe.tick, &keyframe.dof, true)?);
+                count += 1;
+            }
+            frames.extend(newest.map(|frame| (of_cell.cell, frame)));
+        }
+        Ok((frames, count))
+    }
+}
+
+impl Reading {
+    fn decode(&mut self, tick: u64, dof: &[u8], is_keyframe: bool) -> Result<Arc<Frame>, WireError> {
+        let decoded = self.decoder.decode(tick, dof, is_keyframe);
+        self.is_lost |= decoded.is_err();
+        if decoded == Err(WireError::Desync) {
+            self.decoder = CellDecoder::default();
+        }
+        decoded
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pita_protocol::{
+        dof::{Cadence, CellEncoder, Group, Precision, State, kind},
+        encode,
+    };
+    use proptest::prelude::*;
+
+    const CELL: CellId = CellId { x: 2, z: -1 };
+
+    fn granted(cells: &[CellId]) -> Vec<CellGrant> {
+        cells.iter().map(|&cell| CellGrant { cell, layers: 4 }).collect()
+    }
+
+    fn state(x: f64) -> State {
+        let mut state = State::new(Precision::default()).unwrap();
+        state.push(1, kind::PARTICLE, None, &[Group::Point], &[x, 0.0, 0.0]).unwrap();
+        state
+    }
+
+    fn next(encoder: &mut CellEncoder, tick: u64) -> Vec<u8> {
+        let state = state(tick as f64);
+        let due = encoder.due(tick, &state).expect("it moves");
+        let coded = encoder.encode(tick, &state, due, &[]);
+        let (departures, keyframe_age) = (Vec::new(), coded.keyframe_age);
+        encode(&CellSnapshot { cell: CELL, tick, keyframe_age, departures, dof: coded.dof })
+    }
+
+    #[test]
+    fn a_newcomer_asks_and_reads_on_and_asks_again_where_a_keyframe_is_lost() {
+        let (mut encoder, mut inbox) = (CellEncoder::new(Cadence::default()), CellInbox::default());
+        (1..=20).for_each(|tick| drop(next(&mut encoder, tick)));
+        assert!(matches!(inbox.take(&next(&mut encoder, 21)), Ok(Taken::Foreign)));
+        assert_eq!(inbox.grant(21, granted(&[CELL])), Some(vec![]));
+        assert_eq!(inbox.grant(21, granted(&[])), None, "as old as the last");
+        let answer = |encoder: &CellEncoder, wanted: &[KeyframesWanted]| {
+            let mut answer = Keyframes::default();
+            wanted.iter().for_each(|&wanted| answer.push(wanted, encoder.epoch()));
+            answer
+        };
+        assert!(matches!(inbox.take(&next(&mut encoder, 22)), Ok(Taken::Unreadable)));
+        assert_eq!(inbox.wanted(), [KeyframesWanted { cell: CELL, have: 0 }]);
+        let (frames, _) = inbox.take_keyframes(&answer(&encoder, &inbox.wanted())).unwrap();
+        assert_eq!((frames[0].0, frames[0].1.tick()), (CELL, 17));
+        assert!(inbox.wanted().is_empty());
+        assert!(matches!(inbox.take(&next(&mut encoder, 23)), Ok(Taken::Frame(..))));
+        assert!(inbox.wanted().is_empty());
+        // That of tick 25 does not arrive. What comes soon after can be read without it, and tells of it.
+        (24..=25).for_each(|tick| drop(next(&mut encoder, tick)));
+        assert!(matches!(inbox.take(&next(&mut encoder, 26)), Ok(Taken::Frame(..))));
+        assert_eq!(inbox.wanted(), [KeyframesWanted { cell: CELL, have: 17 }]);
+        (27..=29).for_each(|tick| drop(next(&mut encoder, tick)));
+        assert!(matches!(inbox.take(&next(&mut encoder, 30)), Ok(Taken::Unreadable)));
+        let (_, count) = inbox.take_keyframes(&answer(&encoder, &inbox.wanted())).unwrap();
+        assert_eq!(count, 1);
+        assert!(matches!(inbox.take(&next(&mut encoder, 31)), Ok(Taken::Frame(..))));
+        assert_eq!(inbox.grant(32, Vec::new()), Some(vec![CELL]));
+        assert!(matches!(inbox.take(&next(&mut encoder, 32)), Ok(Taken::Foreign)));
+    }
+
+    proptest! {
+        #[test]
+        fn random_messages_never_panic(body: Vec<u8>, dof: Vec<u8>, tick: u64, keyframe_age: u8) {
+            let mut inbox = CellInbox::default();
+            inbox.grant(1, granted(&[CELL]));
+            let head = [pita_protocol::PROTOCOL_VERSION as u8, <CellSnapshot as pita_protocol::Message>::KIND];
+            let _ = inbox.take(&[&head[..], &body].concat());
+            let _ = inbox.take(&encode(&CellSnapshot { cell: CELL, tick, keyframe_age, departures: Vec::new(), dof }));
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! The task that follows which cells a session may take: subscribes to their keys, and asks for keyframes that are missing.
+
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
+
+use pita_protocol::{
+    Keys, encode,
+    message::{CellGrant, CellId, KeyframesRequest, KeyframesWanted},
+};
+use zenoh::pubsub::Subscriber;
+
+use crate::{
+    conditioner::{ConditionerSettings, Delivery, Link},
+    lock::lock,
+    shared::Shared,
+    transport,
+};
+
+/// How long keyframes are waited for, before they are asked for again.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
+/// From one question to the next at least.
+const QUESTION_GAP: Duration = Duration::from_millis(50);
+/// Apart from the seeds of other links.
+const SEED: u64 = 0x63656c6c;
+
+/// Follows the cells of one session.
+pub struct Looking {
+    zenoh: zenoh::Session,
+    keys: Keys,
+    shared: Arc<Shared>,
+    /// All cells come over one, like one network.
+    link: Option<Arc<Link>>,
+    /// What a question takes on its way there and back, over a bad network.
+    way: Duration,
+    layers: BTreeMap<(CellId, u8), Subscriber<()>>,
+}
+
+impl Looking {
+    /// Takes no cells yet.
+    pub fn new(
+        zenoh: zenoh::Session,
+        keys: Keys,
+        shared: Arc<Shared>,
+        conditioner: Option<ConditionerSettings>,
+    ) -> Self {
+        let sink = Arc::clone(&shared);
+        let link = conditioner.map(|settings| {
+            let take = move |bytes: Vec<u8>| sink.take_cell(&bytes);
+            Arc::new(Link::new(settings.down, Delivery::Datagrams, settings.seed ^ SEED, take))
+        });
+        let way = conditioner.map_or(Duration::ZERO, |settings| settings.up.latency + settings.down.latency);
+        Self { zenoh, keys, shared, link, way, layers: BTreeMap::new() }
+    }
+
+    /// Runs until it is aborted.
+    pub async fn run(mut self) {
+        loop {
+            let (granted, wanted) = lock(&self.shared.inbox).cells_to_do();
+            self.follow(&granted).await;
+            if wanted.is_empty() {
+                self.shared.cells_changed.notified().await;
+            } else {
+                self.ask(wanted).await;
+                tokio::time::sleep(QUESTION_GAP).await;
+            }
+        }
+    }
+
+    /// Subscribes to what is `granted`, and to nothing else.
+    async fn follow(&mut self, granted: &[CellGrant]) {
+        let wanted = |cell: CellId, layer: u8| granted.iter().any(|grant| grant.cell == cell && layer < grant.layers);
+        self.layers.retain(|&(cell, layer), _| wanted(cell, layer));
+        for grant in granted {
+            for layer in 0..grant.layers {
+                if self.layers.contains_key(&(grant.cell, layer)) {
+                    continue;
+                }
+                match self.subscribe(self.keys.cell(grant.cell, layer)).await {
+                    Ok(subscriber) => drop(self.layers.insert((grant.cell, layer), subscriber)),
+                    Err(error) => tracing::debug!("subscribing to a cell: {error}"),
+                }
+            }
+        }
+    }
+
+    async fn subscribe(&self, key: String) -> zenoh::Result<Subscriber<()>> {
+        let subscriber = self.zenoh.declare_subscriber(key);
+        match &self.link {
+            Some(link) => {
+                let link = Arc::clone(link);
+                subscriber.callback(move |sample| link.carry(sample.payload().to_bytes().into_owned())).await
+            }
+            None => {
+                let shared = Arc::clone(&self.shared);
+                subscriber.callback(move |sample| shared.take_cell(&sample.payload().to_bytes())).await
+            }
+        }
+    }
+
+    async fn ask(&self, cells: Vec<KeyframesWanted>) {
+        tokio::time::sleep(self.way).await;
+        let request = encode(&KeyframesRequest { cells });
+        let asked = transport::ask(&self.zenoh, &self.keys.keyframes(), "keyframes", request, ANSWER_TIMEOUT).await;
+        match asked {
+            Ok(Some(answer)) => lock(&self.shared.inbox).take_keyframes(&answer),
+            Ok(None) => {}
+            Err(error) => {
+                tracing::debug!("asking for keyframes: {error}");
+                lock(&self.shared.inbox).count_malformed();
+            }
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! Interest cells: the world in squares, each coded once a tick for everybody who looks there.
+//!
+//! Pure. Owns the [division](division) of the world, the [streams](stream) of all cells, the [grants](grants), which cells a
+//! session may take within its byte budget, and what it is sent [beside them](own_stream). Knows no network; [`publish`](crate::publish) puts what comes out.
+
+mod division;
+mod grants;
+mod own_stream;
+mod selection;
+mod stream;
+
+use std::collections::BTreeMap;
+
+use pita_protocol::dof::{Cadence, State};
+use pita_protocol::message::{CellId, Keyframe, LAYERS_MAX};
+
+use crate::crowd::Crowd;
+use division::Division;
+use grants::Grants;
+pub use grants::LEAST_BYTES_PER_S;
+pub use own_stream::{Head, OwnStream};
+pub use stream::Published;
+use stream::Stream;
+
+/// How the world is divided and sent.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Side of a cell, m.
+    pub side_m: f32,
+    /// When keyframes are.
+    pub cadence: Cadence,
+    /// Most that one cell takes, bytes/s; a cell with more to tell carries some of its bodies at a time.
+    pub bytes_per_s: u32,
+    /// Ticks a second.
+    pub tick_hz: u16,
+}
+
+/// What a cell costs who takes it.
+#[derive(Clone, Copy, Debug)]
+struct Offer {
+    /// The cell.
+    pub cell: CellId,
+    /// Of each layer, bytes a tick.
+    pub rates: [f64; LAYERS_MAX as usize],
+    /// Bytes that are sent at once.
+    pub catch_up: usize,
+}
+
+/// All cells.
+#[derive(Debug)]
+pub struct Cells {
+    settings: Settings,
+    division: Division,
+    streams: BTreeMap<CellId, Stream>,
+    published: Vec<Published>,
+    offers: Vec<Offer>,
+    over: Vec<CellId>,
+}
+
+impl Cells {
+    /// No cells yet.
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            settings,
+            division: Division::new(settings.side_m),
+            streams: BTreeMap::new(),
+            published: Vec::new(),
+            offers: Vec::new(),
+            over: Vec::new(),
+        }
+    }
+
+    /// Divides the world of `tick` and codes it, cell by cell.
+    pub fn tick(&mut self, tick: u64, world: &State, crowd: &Crowd) {
+        let Self { settings, division, streams, published, offers, over } = self;
+        let (families, of_bodies) = (crowd.families(), crowd.of_bodies());
+        streams.values_mut().for_each(Stream::clear);
+        let mut moved = Vec::new();
+        division.follow(families, |family, from| moved.push((family, from)));
+        for (family, from) in moved {
+            let members = world.bodies().iter().zip(of_bodies).filter(|(_, of)| **of as usize == family);
+            if let Some(stream) = streams.get_mut(&from) {
+                stream.left(tick, division.cell_of(family), members.map(|(body, _)| body.id).collect());
+            }
+        }
+        for (body, &family) in world.bodies().iter().zip(of_bodies) {
+            let cell = division.cell_of(family as usize);
+            let stream = streams.entry(cell).or_insert_with(|| Stream::new(cell, settings, *world.precision()));
+            stream.add(world, body, &families[family as usize]);
+        }
+        published.clear();
+        published.extend(streams.values_mut().filter_map(|stream| stream.publish(tick)));
+        over.clear();
+        over.extend(streams.extract_if(.., |_, stream| stream.is_over(tick)).map(|(cell, _)| cell));
+        offers.clear();
+        let offer =
+            |(&cell, stream): (&CellId, &Stream)| Offer { cell, rates: *stream.rates(), catch_up: stream.catch_up() };
+        offers.extend(streams.iter().map(offer));
+    }
+
+    /// Snapshots of the last tick, in order of cell.
+    pub fn published(&self) -> &[Published] {
+        &self.published
+    }
+
+    /// Cells that the last tick did away with, because nothing is in them any more.
+    pub fn over(&self) -> &[CellId] {
+        &self.over
+    }
+
+    /// What there is to be taken, in order of cell.
+    fn offers(&self) -> &[Offer] {
+        &self.offers
+    }
+
+    /// The squares.
+    fn division(&self) -> &Division {
+        &self.division
+    }
+
+    /// How many layers a cell has.
+    fn layers(&self) -> u8 {
+        self.settings.cadence.layers()
+    }
+
+    /// What leads to the present keyframe of a cell.
+    pub fn epoch(&self, cell: CellId) -> &[Keyframe] {
+        self.streams.get(&cell).map_or(&[], Stream::epoch)
+    }
+
+    /// Forgets everything: nobody looks.
+    pub fn clear(&mut self) {
+        self.over.clear();
+        self.over.extend(self.streams.keys());
+        self.streams.clear();
+        self.published.clear();
+        self.offers.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests;
