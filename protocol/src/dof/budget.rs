@@ -6,7 +6,7 @@
 /// What a body of a state has to tell a receiver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
-    /// It is where the receiver has it, and stays there.
+    /// It is where the receiver has it.
     Nothing,
     /// So many of its groups moved.
     Update {

@@ -3,7 +3,7 @@
 //! ```text
 //! tick        1   2 .. 8   9   10 .. 16  17  18 ..
 //! published   E   d    d   K   d     d   K   d      E: epoch, needs nothing; K: keyframe, coded against the one before;
-//!             ╰───┴────┴───┴───╯     │   │          d: coded against the last keyframe that is five ticks old
+//!             ╰───┴────┴───┴───╯     │   │          d: coded against the newest keyframe that is five ticks old
 //!                          ╰─────────┴───╯   ...
 //! layer       0   3 2 3 1 3 2 3   0   3 2 ..
 //! ```
@@ -33,9 +33,12 @@ const FRESH_GROUPS_MAX: usize = 64;
 /// Ticks from a keyframe to the first snapshot that is coded against it: who lost it learns of it a tick later, and has it
 /// a round trip of 100 ms after that.
 const SETTLED_TICKS: u64 = 5;
-/// Keyframes that a decoder keeps: snapshots are coded against the last but one, with the one before that, and late ones
-/// against the one before.
-const KEYFRAMES_KEPT: usize = 4;
+/// For so many ticks it is said that there is no more news: once for those who lost the last, and once for those who did
+/// not, to whom two equal states say that the motion between the two before has ended.
+const STILL_TICKS: u64 = 2;
+/// Keyframes that a decoder keeps: where each tick is one, snapshots are coded against the fifth before, and late ones
+/// against one before that.
+const KEYFRAMES_KEPT: usize = 8;
 
 /// When keyframes and epochs are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,7 +76,7 @@ impl Cadence {
 /// What a cell's snapshot of a tick is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Due {
-    /// Coded against the last keyframe.
+    /// Coded against the newest keyframe that has settled.
     Delta,
     /// The same, and others will be coded against it.
     Keyframe,
@@ -102,8 +105,8 @@ pub struct CellEncoder {
     /// The present epoch's keyframes as they were published, oldest first.
     epoch: Vec<Keyframe>,
     needs: Vec<Need>,
-    /// Whether the last tick had news.
-    had_news: bool,
+    /// Ticks since there was news.
+    still: u64,
     /// Whether anything was published since the last keyframe.
     has_told: bool,
     /// Whether many bodies are new.
@@ -114,7 +117,7 @@ impl CellEncoder {
     /// A stream that begins with its first snapshot.
     pub fn new(cadence: Cadence) -> Self {
         let (encoder, epoch, needs) = (Encoder::default(), Vec::new(), Vec::new());
-        Self { cadence, encoder, coming: None, epoch, needs, had_news: false, has_told: false, is_crowded: false }
+        Self { cadence, encoder, coming: None, epoch, needs, still: 0, has_told: false, is_crowded: false }
     }
 
     /// What the snapshot of `tick`, which is newer than all before, is to be; `None` where there is nothing to tell.
@@ -123,13 +126,13 @@ impl CellEncoder {
         self.settle(tick);
         self.encoder.needs(tick, state, &mut self.needs);
         let Some(age) = self.keyframe_age(tick).filter(|&age| age <= AGE_MAX / 2) else {
+            self.still = 0;
             return Some(Due::Epoch);
         };
         let left = self.encoder.baseline(tick).is_some_and(|base| base.bodies().len() != state.bodies().len());
         let has_news = left || self.needs.iter().any(|need| *need != Need::Nothing);
-        // What went away and came back to where the keyframe has it is told once more.
-        let had_news = std::mem::replace(&mut self.had_news, has_news);
-        let has_word = has_news || had_news;
+        self.still = if has_news { 0 } else { self.still.saturating_add(1) };
+        let has_word = self.still <= STILL_TICKS;
         let fresh = self.needs.iter().map(|need| if let Need::First { groups } = need { *groups } else { 0 });
         self.is_crowded = fresh.map(usize::from).sum::<usize>() > FRESH_GROUPS_MAX;
         let is_time = age >= self.cadence.keyframe_ticks() && (has_word || self.has_told);
@@ -190,9 +193,9 @@ impl CellEncoder {
         Coded { dof, layer: 0, keyframe_age: 0 }
     }
 
-    /// From now on snapshots are coded against the newest keyframe, if it is old enough.
+    /// From now on snapshots are coded against the newest keyframe that is old enough.
     fn settle(&mut self, tick: u64) {
-        let settled = self.epoch.last().filter(|last| tick - last.tick >= SETTLED_TICKS).map(|last| last.tick);
+        let settled = self.epoch.iter().rev().map(|keyframe| keyframe.tick).find(|of| tick - of >= SETTLED_TICKS);
         if let Some(keyframe) = settled {
             self.take_over();
             self.encoder.acknowledge(keyframe, 0);

@@ -170,9 +170,10 @@ impl Encoder {
     }
 }
 
-/// What a body whose groups a receiver has as `had` has to tell it.
+/// What a body whose groups a receiver has as `had` has to tell it. That these are still on a track, which takes dozens of
+/// snapshots to calm down, is nothing to tell: a receiver shows what it was told, not where the track leads.
 fn need(had: &[GroupState], now: &[Quantised]) -> Need {
-    let changed = had.iter().zip(now).filter(|(had, now)| had.value != **now || !had.is_calm()).count();
+    let changed = had.iter().zip(now).filter(|(had, now)| had.value != **now).count();
     if changed == 0 { Need::Nothing } else { Need::Update { groups: changed as u16 } }
 }
 
