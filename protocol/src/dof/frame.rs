@@ -164,46 +164,6 @@ impl Frame {
         &self.groups[body.start as usize..][..body.groups.into()]
     }
 
-    /// This frame with what `other` knows beyond it: bodies that it lacks, where `keep` says so, and newer states. What is
-    /// coded next has the models of this one.
-    pub(super) fn merged(&self, other: &Self, keep: impl Fn(u32) -> bool) -> Self {
-        let mut merged = Self {
-            tick: self.tick,
-            precision: self.precision,
-            bodies: Vec::with_capacity(self.bodies.len()),
-            ticks: Vec::with_capacity(self.bodies.len()),
-            groups: Vec::with_capacity(self.groups.len()),
-            models: self.models.clone(),
-        };
-        let (mut a, mut b) = (0, 0);
-        while let Some((from, at)) = match (self.bodies.get(a), other.bodies.get(b)) {
-            (Some(mine), Some(theirs)) if mine.id == theirs.id => {
-                (a, b) = (a + 1, b + 1);
-                let is_newer = self.ticks[a - 1] >= other.ticks[b - 1];
-                Some(if is_newer { (self, a - 1) } else { (other, b - 1) })
-            }
-            (Some(mine), theirs) if theirs.is_none_or(|theirs| mine.id < theirs.id) => {
-                a += 1;
-                Some((self, a - 1))
-            }
-            (_, Some(_)) => {
-                b += 1;
-                Some((other, b - 1))
-            }
-            _ => None,
-        } {
-            let body = from.bodies[at];
-            let is_known = std::ptr::eq(from, self) || self.find(body.id).is_some();
-            let fits = merged.bodies.len() < BODIES_MAX && merged.groups.len() + usize::from(body.groups) <= GROUPS_MAX;
-            if fits && (is_known || keep(body.id)) {
-                merged.bodies.push(Body { start: merged.groups.len() as u32, ..body });
-                merged.ticks.push(from.ticks[at]);
-                merged.groups.extend_from_slice(from.groups(&body));
-            }
-        }
-        merged
-    }
-
     /// Sum of hashes of all that the receiver has, folded to 16 bits: a desync is noticed at once.
     pub fn check(&self) -> u16 {
         let mut sum = 0u64;

@@ -1,12 +1,11 @@
 //! Streams of snapshots: what is coded against what.
 //!
 //! ```text
-//! ┌───────┬────────────┬───────────┬─────────┬─────────────────────────┬───────────────────────┐
-//! │ flags │ base age   │ span      │ check   │ steps: 4 × u32 LE       │ coded bodies          │
-//! │ u8    │ u8, flag 0 │ u8, fl. 1 │ u16 LE  │ without flag 0 only     │ n bytes               │
-//! └───────┴────────────┴───────────┴─────────┴─────────────────────────┴───────────────────────┘
-//! flags: 1 has a baseline (base age ticks older), 2 merged with an earlier one (span ticks before the baseline), each
-//!        body as it was newer, 4 partial
+//! ┌───────┬────────────┬─────────┬─────────────────────────┬───────────────────────┐
+//! │ flags │ base age   │ check   │ steps: 4 × u32 LE       │ coded bodies          │
+//! │ u8    │ u8, flag 1 │ u16 LE  │ without flag 1 only     │ n bytes               │
+//! └───────┴────────────┴─────────┴─────────────────────────┴───────────────────────┘
+//! flags: 1 has a baseline (base age ticks older), 4 partial
 //! ```
 //!
 //! An [`Encoder`] codes against nothing that was not acknowledged. So a lost, late or repeated snapshot harms no other.
@@ -33,7 +32,6 @@ pub const AGE_MAX: u64 = 255;
 pub const SNAPSHOT_MAX: usize = 1 << 20;
 
 const HAS_BASE: u8 = 1;
-const MERGED: u8 = 2;
 const PARTIAL: u8 = 4;
 
 /// Writes a stream for one receiver, or one cell.
@@ -41,8 +39,6 @@ const PARTIAL: u8 = 4;
 pub struct Encoder {
     /// Oldest first.
     sent: VecDeque<Sent>,
-    /// What the two newest that the receiver has come to, where one alone is not all that it has; with their ticks.
-    merged: Option<((u64, u64), Frame)>,
     spent: Spent,
     /// Memory for what is being coded.
     choices: Vec<(u16, u16)>,
@@ -53,30 +49,26 @@ struct Sent {
     frame: Frame,
     /// Whether the receiver is known to have it.
     is_had: bool,
-    /// Whether it may lack what others have.
-    is_partial: bool,
 }
 
 impl Encoder {
     /// The receiver has the snapshot of `tick`, and of each set bit i of `before` that of `tick − 1 − i`.
     pub fn acknowledge(&mut self, tick: u64, before: u32) {
-        for Sent { frame, is_had, .. } in &mut self.sent {
+        for Sent { frame, is_had } in &mut self.sent {
             *is_had |= match tick.checked_sub(frame.tick) {
                 Some(0) => true,
                 Some(age) if age <= 32 => before >> (age - 1) & 1 == 1,
                 _ => false,
             };
         }
-        // What is older than two that the receiver has is not needed again.
+        // What is older than one that the receiver has is not needed again.
         let newest = self.sent.iter().rposition(|sent| sent.is_had);
-        let earlier = newest.and_then(|newest| self.sent.range(..newest).rposition(|sent| sent.is_had));
-        drop(self.sent.drain(..earlier.or(newest).unwrap_or(0)));
+        drop(self.sent.drain(..newest.unwrap_or(0)));
     }
 
     /// The receiver lost the thread: the next snapshot needs nothing before it.
     pub fn restart(&mut self) {
         self.sent.clear();
-        self.merged = None;
     }
 
     /// Codes the snapshot of `tick`, which is newer than all before. `chosen` says for each body of the state whether it
@@ -86,31 +78,22 @@ impl Encoder {
     /// Where `tick` is not newer than all before.
     pub fn encode(&mut self, tick: u64, state: &State, chosen: &[bool]) -> Vec<u8> {
         assert!(self.sent.back().is_none_or(|last| last.frame.tick < tick), "ticks ascend");
-        self.merge(tick);
         let mut choices = std::mem::take(&mut self.choices);
-        let against = match &self.merged {
-            Some(((_, earlier), merged)) => Some(Against { base: merged, earlier: Some(*earlier) }),
-            None => self.known(tick).next().map(|sent| Against { base: &sent.frame, earlier: None }),
-        };
-        let (bytes, frame, spent) = encode_against(against, tick, Source { state, chosen }, &mut choices);
+        let (bytes, frame, spent) = encode_against(self.baseline(tick), tick, Source { state, chosen }, &mut choices);
         self.choices = choices;
         self.spent = spent;
         let remembered = |sent: &VecDeque<Sent>| sent.iter().map(|sent| sent.frame.groups.len()).sum::<usize>();
         while self.sent.len() == HISTORY || (self.sent.len() > 1 && remembered(&self.sent) > REMEMBERED_MAX) {
             self.sent.pop_front();
         }
-        // What does not carry everything may be no more than a part of what the receiver has.
-        let is_partial = chosen.contains(&false);
-        self.sent.push_back(Sent { frame, is_had: false, is_partial });
+        self.sent.push_back(Sent { frame, is_had: false });
         bytes
     }
 
     /// What each body of `state` has to tell the receiver that the snapshot of `tick` is coded for, in their order.
-    pub fn needs(&mut self, tick: u64, state: &State, into: &mut Vec<Need>) {
+    pub fn needs(&self, tick: u64, state: &State, into: &mut Vec<Need>) {
         into.clear();
-        self.merge(tick);
-        let newest = self.known(tick).next().map(|sent| &sent.frame);
-        let base = self.merged.as_ref().map(|(_, merged)| merged).or(newest);
+        let base = self.baseline(tick);
         let mut known = base.map_or(&[][..], |base| &base.bodies).iter().peekable();
         for body in state.bodies() {
             while known.next_if(|known| known.id < body.id).is_some() {}
@@ -129,28 +112,10 @@ impl Encoder {
         &self.spent
     }
 
-    /// What the snapshot of `tick` was found to be coded against by [`Encoder::needs`].
+    /// What the snapshot of `tick` is coded against: the newest that the receiver has.
     pub(super) fn baseline(&self, tick: u64) -> Option<&Frame> {
-        let newest = self.known(tick).next().map(|sent| &sent.frame);
-        self.merged.as_ref().map(|(_, merged)| merged).or(newest)
-    }
-
-    /// Snapshots that the receiver has, newest first.
-    fn known(&self, tick: u64) -> impl Iterator<Item = &Sent> {
-        self.sent.iter().rev().filter(move |sent| sent.is_had && tick - sent.frame.tick <= AGE_MAX)
-    }
-
-    /// Joins the two newest that the receiver has, where the newest alone may lack something.
-    fn merge(&mut self, tick: u64) {
-        let mut known = self.known(tick);
-        let pair = known.next().filter(|newest| newest.is_partial).zip(known.next());
-        let pair = pair.filter(|(newest, earlier)| newest.frame.tick - earlier.frame.tick <= AGE_MAX);
-        let ticks = pair.map(|(newest, earlier)| (newest.frame.tick, earlier.frame.tick));
-        if self.merged.as_ref().map(|(ticks, _)| *ticks) != ticks {
-            let merged = pair.map(|(newest, earlier)| newest.frame.merged(&earlier.frame, |_| true));
-            drop(known);
-            self.merged = ticks.zip(merged);
-        }
+        let newest = self.sent.iter().rev().find(|sent| sent.is_had).map(|sent| &sent.frame);
+        newest.filter(|newest| tick - newest.tick <= AGE_MAX)
     }
 
     /// Forgets the snapshot that was coded last: it is not sent, or nothing will build on it.
@@ -177,36 +142,24 @@ fn need(had: &[GroupState], now: &[Quantised]) -> Need {
     if changed == 0 { Need::Nothing } else { Need::Update { groups: changed as u16 } }
 }
 
-/// What a snapshot is coded against.
-struct Against<'a> {
-    /// The newest frame that the receiver has, with what the earlier one knows beyond it.
-    base: &'a Frame,
-    /// Tick of the earlier one, if there is one.
-    earlier: Option<u64>,
-}
-
 /// The snapshot of `tick` as bytes, the frame that a receiver has after it, and what bodies took of the bytes.
 fn encode_against(
-    against: Option<Against<'_>>,
+    base: Option<&Frame>,
     tick: u64,
     source: Source<'_>,
     choices: &mut Vec<(u16, u16)>,
 ) -> (Vec<u8>, Frame, Spent) {
     let partial = source.chosen.iter().any(|carried| !carried);
     let mut bytes = vec![u8::from(partial) * PARTIAL];
-    if let Some(Against { base, earlier }) = &against {
+    if let Some(base) = base {
         bytes[0] |= HAS_BASE;
         bytes.push((tick - base.tick) as u8);
-        if let Some(earlier) = earlier {
-            bytes[0] |= MERGED;
-            bytes.push((base.tick - earlier) as u8);
-        }
     }
     let check_at = bytes.len();
     bytes.extend([0; 2]);
     let empty;
-    let base = match against {
-        Some(Against { base, .. }) => base,
+    let base = match base {
+        Some(base) => base,
         None => {
             empty = Frame::empty(*source.state.precision());
             let p = empty.precision;
@@ -243,20 +196,13 @@ impl Decoder {
         require(bytes.len() <= SNAPSHOT_MAX, "snapshot", "at most 1 MiB")?;
         let mut header = Header { bytes };
         let [flags] = header.take()?;
-        require(flags & !(HAS_BASE | MERGED | PARTIAL) == 0, "snapshot flags", "those that are known")?;
-        let (empty, merged);
+        require(flags & !(HAS_BASE | PARTIAL) == 0, "snapshot flags", "those that are known")?;
+        let empty;
         let mut base = None;
         if flags & HAS_BASE != 0 {
             let [age] = header.take()?;
             require(age > 0, "age of the baseline", "1 to 255")?;
             base = Some(self.at(tick.checked_sub(age.into()))?);
-        }
-        if flags & MERGED != 0 {
-            let [span] = header.take()?;
-            let newest = base.ok_or(WireError::Malformed)?;
-            require(span > 0, "span of the baselines", "1 to 255")?;
-            merged = newest.merged(self.at(newest.tick.checked_sub(span.into()))?, |_| true);
-            base = Some(&merged);
         }
         let check = u16::from_le_bytes(header.take()?);
         let base = match base {
