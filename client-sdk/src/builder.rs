@@ -148,7 +148,8 @@ impl SessionBuilder {
     /// Any [`ClientError`] but [`Spectator`](ClientError::Spectator) and [`Ended`](ClientError::Ended).
     pub async fn connect(self) -> Result<Session, ClientError> {
         let resume = self.resume.as_ref().map(ResumeTicket::proof);
-        let request = JoinRequest { name: self.name.clone(), role: self.role, bytes_per_s: self.bytes_per_s, resume };
+        let Self { name, role, bytes_per_s, .. } = self.clone();
+        let mut request = JoinRequest { name, role, bytes_per_s, cells_along: false, resume };
         request.validate().map_err(ClientError::BadArgument)?;
         self.datagrams.as_deref().map_or(Ok(()), datagrams::check)?;
         let zenoh = transport::open(&self.endpoint, self.connect_timeout).await?;
@@ -156,6 +157,7 @@ impl SessionBuilder {
             Some(endpoint) => datagrams::open(endpoint, self.connect_timeout).await,
             None => None,
         };
+        request.cells_along = datagrams.is_some();
         let joined = join(&self, &zenoh, datagrams, request).await;
         if joined.is_err() {
             transport::close(&zenoh).await;

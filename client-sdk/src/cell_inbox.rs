@@ -21,6 +21,15 @@ pub enum Taken {
     Foreign,
 }
 
+/// What an answer to a question for keyframes came to.
+#[derive(Debug, Default)]
+pub struct Fetched {
+    /// What cells are like then.
+    pub frames: Vec<(CellId, Arc<Frame>)>,
+    /// How many keyframes that were.
+    pub keyframes: usize,
+}
+
 /// Receiving side of cells.
 #[derive(Debug, Default)]
 pub struct CellInbox {
@@ -102,12 +111,12 @@ impl CellInbox {
         }
     }
 
-    /// Takes an answer to what was asked for; answers what the cells are like then, and how many keyframes that were.
+    /// Takes an answer to what was asked for.
     ///
     /// # Errors
     /// [`WireError`] for what no server sends.
-    pub fn take_keyframes(&mut self, answer: &Keyframes) -> Result<(Vec<(CellId, Arc<Frame>)>, usize), WireError> {
-        let (mut frames, mut count) = (Vec::new(), 0);
+    pub fn take_keyframes(&mut self, answer: &Keyframes) -> Result<Fetched, WireError> {
+        let mut fetched = Fetched::default();
         for of_cell in &answer.cells {
             let Some(reading) = self.cells.get_mut(&of_cell.cell) else { continue };
             // Where there is nothing, or nothing newer, the stream itself says the rest.
@@ -115,11 +124,11 @@ impl CellInbox {
             let mut newest = None;
             for keyframe in &of_cell.keyframes {
                 newest = Some(reading.decode(keyframe.tick, &keyframe.dof, true)?);
-                count += 1;
+                fetched.keyframes += 1;
             }
-            frames.extend(newest.map(|frame| (of_cell.cell, frame)));
+            fetched.frames.extend(newest.map(|frame| (of_cell.cell, frame)));
         }
-        Ok((frames, count))
+        Ok(fetched)
     }
 }
 
@@ -177,7 +186,7 @@ mod tests {
         };
         assert!(matches!(inbox.take(&next(&mut encoder, 22)), Ok(Taken::Unreadable)));
         assert_eq!(inbox.wanted(), [KeyframesWanted { cell: CELL, have: 0 }]);
-        let (frames, _) = inbox.take_keyframes(&answer(&encoder, &inbox.wanted())).unwrap();
+        let frames = inbox.take_keyframes(&answer(&encoder, &inbox.wanted())).unwrap().frames;
         assert_eq!((frames[0].0, frames[0].1.tick()), (CELL, 17));
         assert!(inbox.wanted().is_empty());
         assert!(matches!(inbox.take(&next(&mut encoder, 23)), Ok(Taken::Frame(..))));
@@ -188,8 +197,7 @@ mod tests {
         assert_eq!(inbox.wanted(), [KeyframesWanted { cell: CELL, have: 17 }]);
         (27..=29).for_each(|tick| drop(next(&mut encoder, tick)));
         assert!(matches!(inbox.take(&next(&mut encoder, 30)), Ok(Taken::Unreadable)));
-        let (_, count) = inbox.take_keyframes(&answer(&encoder, &inbox.wanted())).unwrap();
-        assert_eq!(count, 1);
+        assert_eq!(inbox.take_keyframes(&answer(&encoder, &inbox.wanted())).unwrap().keyframes, 1);
         assert!(matches!(inbox.take(&next(&mut encoder, 31)), Ok(Taken::Frame(..))));
         assert_eq!(inbox.grant(32, Vec::new()), Some(vec![CELL]));
         assert!(matches!(inbox.take(&next(&mut encoder, 32)), Ok(Taken::Foreign)));

@@ -158,9 +158,9 @@ impl Inbox {
     /// Takes keyframes that were asked for.
     pub fn take_keyframes(&mut self, answer: &Keyframes) {
         match self.cells.take_keyframes(answer) {
-            Ok((frames, count)) => {
-                self.statistics.keyframes_fetched += count as u64;
-                for (cell, frame) in frames {
+            Ok(fetched) => {
+                self.statistics.keyframes_fetched += fetched.keyframes as u64;
+                for (cell, frame) in fetched.frames {
                     self.bodies.take(Source::Cell(cell), &frame, &[], |_| false);
                 }
             }

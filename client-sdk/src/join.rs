@@ -78,6 +78,8 @@ pub async fn join(
     let shared = Arc::new(shared);
     let snapshots =
         SnapshotKey { key: keys.snapshot(accepted.slot), shared: Arc::clone(&shared), conditioner: wanted.conditioner };
+    // Over datagrams cells come along with the snapshots.
+    let subscribes_to_cells = datagrams.is_none();
     let declared = Declared {
         _events: events,
         _snapshots: match datagrams {
@@ -87,7 +89,8 @@ pub async fn join(
         _token: declare_alive(zenoh, &keys, &accepted).await?,
     };
     let wire = Arc::new(Wire::open(zenoh, &keys, &accepted, Arc::clone(&shared), wanted.conditioner).await?);
-    let looking = Looking::new(zenoh.clone(), keys.clone(), Arc::clone(&shared), wanted.conditioner);
+    let looking =
+        Looking::new(zenoh.clone(), keys.clone(), Arc::clone(&shared), wanted.conditioner, subscribes_to_cells);
     let silent_otherwise = wanted.role == Role::Spectator;
     let keeper = Keeper {
         zenoh: zenoh.clone(),
@@ -216,7 +219,7 @@ impl SnapshotKey {
             if let Some(counted) = &counted {
                 counted.fetch_add(1, Ordering::Relaxed);
             }
-            shared.take_snapshot(bytes, Instant::now());
+            shared.take_own(bytes, Instant::now());
         };
         let (action, delivery) = ("subscribe to snapshots", Delivery::Datagrams);
         subscribe(zenoh, self.key.clone(), action, self.conditioner, delivery, take).await

@@ -31,16 +31,19 @@ pub struct Looking {
     link: Option<Arc<Link>>,
     /// What a question takes on its way there and back, over a bad network.
     way: Duration,
+    /// Else they come along with the session's snapshots.
+    subscribes: bool,
     layers: BTreeMap<(CellId, u8), Subscriber<()>>,
 }
 
 impl Looking {
-    /// Takes no cells yet.
+    /// Takes no cells yet; they come on their own keys where it `subscribes`.
     pub fn new(
         zenoh: zenoh::Session,
         keys: Keys,
         shared: Arc<Shared>,
         conditioner: Option<ConditionerSettings>,
+        subscribes: bool,
     ) -> Self {
         let sink = Arc::clone(&shared);
         let link = conditioner.map(|settings| {
@@ -48,14 +51,16 @@ impl Looking {
             Arc::new(Link::new(settings.down, Delivery::Datagrams, settings.seed ^ SEED, take))
         });
         let way = conditioner.map_or(Duration::ZERO, |settings| settings.up.latency + settings.down.latency);
-        Self { zenoh, keys, shared, link, way, layers: BTreeMap::new() }
+        Self { zenoh, keys, shared, link, way, subscribes, layers: BTreeMap::new() }
     }
 
     /// Runs until it is aborted.
     pub async fn run(mut self) {
         loop {
             let (granted, wanted) = lock(&self.shared.inbox).cells_to_do();
-            self.follow(&granted).await;
+            if self.subscribes {
+                self.follow(&granted).await;
+            }
             if wanted.is_empty() {
                 self.shared.cells_changed.notified().await;
             } else {

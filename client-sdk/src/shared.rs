@@ -7,7 +7,10 @@ use std::{
 
 #[cfg(feature = "prediction")]
 use pita_protocol::message::Controls;
-use pita_protocol::message::JoinAccepted;
+use pita_protocol::{
+    Message, kind_of,
+    message::{CellSnapshot, JoinAccepted},
+};
 use tokio::sync::{Notify, watch};
 
 #[cfg(feature = "prediction")]
@@ -64,7 +67,15 @@ impl Shared {
         }
     }
 
-    pub fn take_snapshot(&self, bytes: &[u8], now: Instant) {
+    /// Takes what came on the key of the session's snapshots: cells come along where it asked for that.
+    pub fn take_own(&self, bytes: &[u8], now: Instant) {
+        match kind_of(bytes) {
+            Some(CellSnapshot::KIND) => self.take_cell(bytes),
+            _ => self.take_snapshot(bytes, now),
+        }
+    }
+
+    fn take_snapshot(&self, bytes: &[u8], now: Instant) {
         let (snapshot, is_changed) = {
             let mut inbox = lock(&self.inbox);
             let before = inbox.cells_version();

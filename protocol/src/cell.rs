@@ -83,7 +83,7 @@ impl Message for CellSnapshot {
 /// Query payload on [`keyframes`](crate::Keys::keyframes), answered by [`Keyframes`].
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeyframesRequest {
-    /// What is wanted, at most [`GRANTS_MAX`].
+    /// What is wanted, at most [`GRANTS_MAX`], in order of cell.
     pub cells: Vec<KeyframesWanted>,
 }
 
@@ -100,7 +100,9 @@ impl Message for KeyframesRequest {
     const KIND: u8 = 14;
     const MAX_BYTES: usize = 2048;
     fn validate(&self) -> Result<(), WireError> {
-        require(self.cells.len() <= GRANTS_MAX, "cells", "at most 128")
+        require(self.cells.len() <= GRANTS_MAX, "cells", "at most 128")?;
+        // Who asks for one cell many times would be answered as many times.
+        require(self.cells.is_sorted_by(|a, b| a.cell < b.cell), "cells", "ascending")
     }
 }
 
@@ -165,8 +167,8 @@ mod tests {
         let departures = vec![Departure { to: CellId::EVERYWHERE, bodies: vec![1, 5] }];
         let snapshot = CellSnapshot { cell, tick: 9, keyframe_age: 3, departures, dof: vec![1, 2] };
         assert_eq!(decode(&encode(&snapshot)), Ok(snapshot));
-        let wanted = KeyframesWanted { cell, have: u64::MAX };
-        let request = KeyframesRequest { cells: vec![wanted; GRANTS_MAX] };
+        let wanted = |x| KeyframesWanted { cell: CellId { x, z: i16::MIN }, have: u64::MAX };
+        let request = KeyframesRequest { cells: (i16::MIN..).map(wanted).take(GRANTS_MAX).collect() };
         assert_eq!(decode(&encode(&request)), Ok(request));
     }
 
@@ -199,5 +201,7 @@ mod tests {
         let of_cell = CellKeyframes { cell: CellId::default(), keyframes: vec![keyframe(2), keyframe(2)] };
         let unordered = Keyframes { cells: vec![of_cell] };
         assert!(decode::<Keyframes>(&encode(&unordered)).is_err());
+        let twice = KeyframesRequest { cells: vec![KeyframesWanted::default(); 2] };
+        assert!(decode::<KeyframesRequest>(&encode(&twice)).is_err());
     }
 }

@@ -92,6 +92,13 @@ pub fn encode<M: Message>(message: &M) -> Vec<u8> {
         .expect("in-memory encoding of plain data")
 }
 
+/// Kind of the message in `bytes`, on keys that carry several; `None` where it is none of this version.
+pub fn kind_of(bytes: &[u8]) -> Option<u8> {
+    let limited = config::standard().with_limit::<DECODE_MEMORY_MAX>();
+    let ((version, kind), _): ((u16, u8), usize) = bincode::serde::decode_from_slice(bytes, limited).ok()?;
+    (version == PROTOCOL_VERSION).then_some(kind)
+}
+
 /// Decodes and validates a message of type `M`.
 ///
 /// # Errors

@@ -19,7 +19,7 @@ pub mod keys;
 pub mod message;
 pub mod seal;
 
-pub use codec::{Message, WireError, decode, encode};
+pub use codec::{Message, WireError, decode, encode, kind_of};
 pub use keys::Keys;
 
 /// Version of everything this crate encodes; the first field of every message.

@@ -48,6 +48,9 @@ pub struct JoinRequest {
     /// How much of the state it wants to be sent, bytes/s; the server gives no more than its configuration allows, and not
     /// less than 8000. `None` for what the server gives.
     pub bytes_per_s: Option<u32>,
+    /// Whether what it may take of cells is put on the key of its own snapshots, where it need not subscribe to any: over
+    /// datagrams subscriptions get lost, and so does what takes them back.
+    pub cells_along: bool,
     /// The earlier session that is to go on, where it is not over yet; name and role stay what they were.
     pub resume: Option<ResumeProof>,
 }
@@ -558,7 +561,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn join(name: &str) -> JoinRequest {
-        JoinRequest { name: name.to_owned(), role: Role::Player, bytes_per_s: None, resume: None }
+        JoinRequest { name: name.to_owned(), role: Role::Player, bytes_per_s: None, cells_along: false, resume: None }
     }
 
     fn packet(throttle: f32) -> InputPacket {

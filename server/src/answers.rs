@@ -250,10 +250,10 @@ impl Answering {
         let key = secrets.key.clone();
         let now_ms = self.shared.clock.ms();
         let joined = match &request.resume {
-            Some(proof) => sessions.resume(proof, secrets, now_ms),
+            Some(proof) => sessions.resume(proof, request.cells_along, secrets, now_ms),
             None => {
-                let JoinRequest { name, role, bytes_per_s, .. } = &request;
-                sessions.join(Wish { name, role: *role, bytes_per_s: *bytes_per_s }, secrets, now_ms)
+                let JoinRequest { ref name, role, bytes_per_s, cells_along, .. } = request;
+                sessions.join(Wish { name, role, bytes_per_s, cells_along }, secrets, now_ms)
             }
         };
         let id = joined.map_err(|refusal| match refusal {

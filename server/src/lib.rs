@@ -11,7 +11,7 @@
 //!
 //! The tick thread ([`tick_thread`]) waits for its next tick and for nothing else. Queues between threads are bounded
 //! and lock-free; locks are shared only by threads that serve the network. Pure, and tested without threads: sessions
-//! ([`sessions`]), who is sent to whom ([`selection`]), pacing ([`pacer`]), controls ([`drivers`]), matching of players and sessions ([`boarding`]).
+//! ([`sessions`]), what is sent to whom ([`cells`]), pacing ([`pacer`]), controls ([`drivers`]), matching of players and sessions ([`boarding`]).
 
 pub mod admin;
 pub mod answers;

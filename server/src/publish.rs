@@ -35,6 +35,8 @@ const IDLE: Duration = Duration::from_millis(100);
 struct Feed {
     id: SessionId,
     outlet: Outlet,
+    /// For cells, where they come along.
+    along: Option<Outlet>,
     own: OwnStream,
 }
 
@@ -117,8 +119,11 @@ impl Publishing {
             self.shared.sessions().take_changes(&mut changes);
             for change in changes.drain(..) {
                 match change {
-                    Change::Began { id, role, name, bytes_per_s } => self.begin_session(id, role, name, bytes_per_s),
-                    Change::Resumed { from, to } => self.resume_session(from, to),
+                    Change::Began { id, role, name, bytes_per_s, cells_along } => {
+                        self.begin_feed(id, bytes_per_s, cells_along);
+                        self.begin_session(id, role, name);
+                    }
+                    Change::Resumed { from, to, cells_along } => self.resume_session(from, to, cells_along),
                     Change::Said { slot, text } => self.publish_event(Event::Said { slot, text }),
                     Change::Ended { id, role, reason } => self.end_session(id, role, reason),
                 }
@@ -133,15 +138,25 @@ impl Publishing {
         }
     }
 
-    fn begin_session(&mut self, id: SessionId, role: Role, name: String, bytes_per_s: u32) {
-        match Outlet::for_snapshots(&self.session, self.shared.keys.snapshot(id.slot)) {
-            Ok(outlet) => {
+    fn begin_feed(&mut self, id: SessionId, bytes_per_s: u32, cells_along: bool) {
+        let outlets = Outlet::for_snapshots(&self.session, self.shared.keys.snapshot(id.slot))
+            .and_then(|outlet| Ok((outlet, self.along(id.slot, cells_along)?)));
+        match outlets {
+            Ok((outlet, along)) => {
                 let precision = *self.state.precision();
                 let own = OwnStream::new(precision, bytes_per_s, self.shared.tick_hz);
-                self.feeds.insert(id.slot, Feed { id, outlet, own });
+                self.feeds.insert(id.slot, Feed { id, outlet, along, own });
             }
             Err(reason) => tracing::error!("no publisher for slot {}: {reason}", id.slot),
         }
+    }
+
+    /// What puts cells on the key of the snapshots of `slot`, where they are `wanted` there.
+    fn along(&self, slot: u16, wanted: bool) -> zenoh::Result<Option<Outlet>> {
+        wanted.then(|| Outlet::for_cells(&self.session, self.shared.keys.snapshot(slot))).transpose()
+    }
+
+    fn begin_session(&mut self, id: SessionId, role: Role, name: String) {
         tracing::info!("slot {}: {name:?} joins as {role:?}", id.slot);
         match role {
             Role::Player => self.board(Boarding::Enter { id, name }),
@@ -153,9 +168,13 @@ impl Publishing {
     }
 
     /// The arena notices nothing: the car is there, or on its way.
-    fn resume_session(&mut self, from: SessionId, to: SessionId) {
+    fn resume_session(&mut self, from: SessionId, to: SessionId, cells_along: bool) {
+        let along = self.along(to.slot, cells_along).unwrap_or_else(|reason| {
+            tracing::error!("no publisher of cells for slot {}: {reason}", to.slot);
+            None
+        });
         if let Some(feed) = self.feeds.get_mut(&to.slot) {
-            feed.id = to;
+            (feed.id, feed.along) = (to, along);
         }
         // Whoever still waits for the earlier join waits for nothing.
         self.asker.tell(Work::Ended(from, EndReason::Resumed));
@@ -267,6 +286,9 @@ impl Publishing {
                 event_sequence: self.description.event_sequence,
                 acknowledged: self.shared.sessions().acknowledged(feed.id),
             };
+            if let Some(along) = &feed.along {
+                feed.own.granted(&self.cells).for_each(|published| along.put(published.bytes.clone()));
+            }
             let (bytes, of_cells) = feed.own.snapshot(&head, &self.cells);
             self.shared.counters.sent_bytes.add((bytes.len() + of_cells) as u64);
             feed.outlet.put(bytes);

@@ -40,6 +40,8 @@ pub struct Wish<'a> {
     pub role: Role,
     /// Byte budget; `None` for what the server gives.
     pub bytes_per_s: Option<u32>,
+    /// Whether cells come along with its own snapshots.
+    pub cells_along: bool,
 }
 
 /// One session, named for good: a slot is used again, a pair of slot and epoch is not, as far as chance goes.
@@ -103,6 +105,8 @@ pub enum Change {
         name: String,
         /// Its byte budget.
         bytes_per_s: u32,
+        /// Whether cells come along with its own snapshots.
+        cells_along: bool,
     },
     /// A player's session goes on under another id.
     Resumed {
@@ -110,6 +114,8 @@ pub enum Change {
         from: SessionId,
         /// What it is from now on; the slot is the same.
         to: SessionId,
+        /// Whether cells come along with its own snapshots now.
+        cells_along: bool,
     },
     /// A session says something that everybody is to read.
     Said {
@@ -250,8 +256,8 @@ impl Sessions {
             said_sequence: 0,
             quiet_ms: 0,
         });
-        let bytes_per_s = self.bytes_per_s(wish.bytes_per_s);
-        self.changes.push(Change::Began { id, role, name: name.to_owned(), bytes_per_s });
+        let (bytes_per_s, cells_along) = (self.bytes_per_s(wish.bytes_per_s), wish.cells_along);
+        self.changes.push(Change::Began { id, role, name: name.to_owned(), bytes_per_s, cells_along });
         Ok(id)
     }
 
@@ -261,11 +267,18 @@ impl Sessions {
         wish.map_or(most, |wish| wish.clamp(LEAST_BYTES_PER_S.min(most), most))
     }
 
-    /// Lets a player's session go on that `proof` is for, whether its connection is known to be lost or not.
+    /// Lets a player's session go on that `proof` is for, whether its connection is known to be lost or not; its cells come
+    /// as `cells_along` says from then on.
     ///
     /// # Errors
     /// [`JoinRefusal::Over`], [`JoinRefusal::Closing`].
-    pub fn resume(&mut self, proof: &ResumeProof, secrets: Secrets, now_ms: u64) -> Result<SessionId, JoinRefusal> {
+    pub fn resume(
+        &mut self,
+        proof: &ResumeProof,
+        cells_along: bool,
+        secrets: Secrets,
+        now_ms: u64,
+    ) -> Result<SessionId, JoinRefusal> {
         if self.closing {
             return Err(JoinRefusal::Closing);
         }
@@ -279,7 +292,7 @@ impl Sessions {
         (session.epoch, session.key, session.acknowledged) = (to.epoch, secrets.key, (0, 0));
         (session.heard_ms, session.away_since_ms, session.last_sequence) = (now_ms, None, 0);
         session.said_sequence = 0;
-        self.changes.push(Change::Resumed { from, to });
+        self.changes.push(Change::Resumed { from, to, cells_along });
         Ok(to)
     }
 

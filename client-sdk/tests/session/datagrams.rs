@@ -7,10 +7,14 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use pita_client::{ClientError, Session};
+use pita_protocol::{
+    decode, encode,
+    message::{CellGrant, CellId, CellSnapshot, JoinRequest, Snapshot},
+};
 
 use crate::{
     builder,
-    fake_server::{FakeServer, snapshot},
+    fake_server::{FakeServer, SLOT, accept, car, snapshot},
     soon,
 };
 
@@ -112,6 +116,45 @@ async fn snapshots_come_as_datagrams_some_of_which_are_lost() {
     assert!(relay.down() > before + 60 * 20, "{} bytes in datagrams", relay.down() - before);
     // What is lost is not repeated and holds up nothing.
     assert!(ticks.is_sorted() && ticks[59] >= ticks[0] + 62, "{ticks:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn cells_come_along_as_datagrams_and_need_no_subscription() {
+    const NEIGHBOUR: u32 = 990;
+    let wishes = Arc::new(AtomicBool::new(false));
+    let of_joins = Arc::clone(&wishes);
+    let server = FakeServer::answering(Box::new(move |request| {
+        let request: JoinRequest = decode(request).expect("the client's request");
+        of_joins.store(request.cells_along, Ordering::Relaxed);
+        Some(accept(SLOT, request.role))
+    }))
+    .await;
+    let relay = Relay::start(server.datagrams, 5);
+    let session = builder(&server).datagrams(&relay.endpoint).connect().await.unwrap();
+    assert!(wishes.load(Ordering::Relaxed), "cells are to come along");
+    let cell = CellId { x: 0, z: 0 };
+    let put = async {
+        for tick in 101.. {
+            let dof = car(NEIGHBOUR, tick, 5.0);
+            let of_cell = CellSnapshot { cell, tick, keyframe_age: 0, departures: Vec::new(), dof };
+            server.put_on_snapshot(encode(&of_cell)).await;
+            server.put_snapshot(Snapshot { cells: Some(vec![CellGrant { cell, layers: 1 }]), ..snapshot(tick) }).await;
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    };
+    let see = async {
+        loop {
+            let snapshot = soon("a snapshot", session.next_snapshot()).await.unwrap();
+            if snapshot.slices().iter().any(|slice| slice.id == NEIGHBOUR) {
+                break;
+            }
+        }
+    };
+    tokio::select! {
+        () = soon("a body of the cell", see) => {}
+        () = put => unreachable!("ticks do not end"),
+    }
+    assert!(session.statistics().cells_received > 0 && session.statistics().malformed == 0);
 }
 
 #[tokio::test(flavor = "multi_thread")]

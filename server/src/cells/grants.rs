@@ -74,6 +74,11 @@ impl Grants {
         self.acknowledged = self.acknowledged.max(Some(tick));
     }
 
+    /// Those of `published` that the session may take.
+    pub fn granted<'a>(&self, published: &'a [Published]) -> impl Iterator<Item = &'a Published> {
+        published.iter().filter(|published| self.layers(published.cell) > published.layer)
+    }
+
     /// A tick goes by, in which `published` was. Answers the bytes of it that the session was granted.
     pub fn fill(&mut self, tick: u64, published: &[Published]) -> usize {
         let acknowledged = *self.acknowledged.get_or_insert(tick);
@@ -81,8 +86,7 @@ impl Grants {
         self.share = if is_late { self.share * LEFT } else { (self.share + GIVEN_BACK).min(1.0) };
         self.share = self.share.max(self.least_per_tick / self.bytes_per_tick.max(1.0));
         let fill = self.bytes_per_tick * self.share;
-        let taken = |published: &&Published| self.layers(published.cell) > published.layer;
-        let bytes = published.iter().filter(taken).map(|published| published.bytes.len()).sum();
+        let bytes = self.granted(published).map(|published| published.bytes.len()).sum();
         self.saved = (self.saved + fill - bytes as f64).min(fill * SAVED_TICKS_MAX);
         bytes
     }

@@ -1,7 +1,7 @@
 //! Interest cells: the world in squares, each coded once a tick for everybody who looks there.
 //!
-//! Pure. Owns the [division](division) of the world, the [streams](stream) of all cells, the [grants](grants), which cells a
-//! session may take within its byte budget, and what it is sent [beside them](own_stream). Knows no network; [`publish`](crate::publish) puts what comes out.
+//! Pure. Owns the division of the world, the streams of all cells, the grants, which say what cells a session may take
+//! within its byte budget, and what it is sent beside them. Knows no network; `publish` puts what comes out.
 
 mod division;
 mod grants;

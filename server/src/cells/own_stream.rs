@@ -5,7 +5,7 @@
 use pita_protocol::dof::{Body, Encoder, Precision, State};
 use pita_protocol::message::{InputAck, Snapshot};
 
-use super::{Cells, Grants};
+use super::{Cells, Grants, Published};
 use crate::crowd::Family;
 
 /// The stream of one session.
@@ -55,6 +55,12 @@ impl OwnStream {
         self.position = family.position;
         // A part of a world that fits does.
         drop(self.state.push_copy(world, body));
+    }
+
+    /// Those messages of the `cells` of this tick that the session may take; to be asked for before
+    /// [`OwnStream::snapshot`], which chooses for the next.
+    pub fn granted<'a>(&self, cells: &'a Cells) -> impl Iterator<Item = &'a Published> {
+        self.grants.granted(cells.published())
     }
 
     /// The snapshot that follows the `cells` of its tick, encoded, and the bytes that the session is sent of those.

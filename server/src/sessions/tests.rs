@@ -12,14 +12,14 @@ const LIMITS: Limits = Limits {
 };
 
 fn player(name: &str) -> Wish<'_> {
-    Wish { name, role: Role::Player, bytes_per_s: None }
+    Wish { name, role: Role::Player, bytes_per_s: None, cells_along: false }
 }
 
 fn join(sessions: &mut Sessions, role: Role, now_ms: u64) -> Result<SessionId, JoinRefusal> {
     static EPOCHS: AtomicU32 = AtomicU32::new(1);
     let secrets = secrets(EPOCHS.fetch_add(1, Ordering::Relaxed));
     let name = &format!("Wu {}", secrets.epoch);
-    sessions.join(Wish { name, role, bytes_per_s: None }, secrets, now_ms)
+    sessions.join(Wish { name, role, bytes_per_s: None, cells_along: false }, secrets, now_ms)
 }
 
 fn secrets(epoch: u32) -> Secrets {
@@ -198,12 +198,15 @@ fn whoever_proves_it_resumes_once_in_the_same_slot_with_a_new_epoch_and_key() {
         of(elsewhere, &SessionKey([77; 32])),
         of(SessionId { epoch: 76, ..id }, &SessionKey([77; 32])),
     ] {
-        assert_eq!(sessions.resume(&bad, secrets(5), 2000), Err(JoinRefusal::Over));
+        assert_eq!(sessions.resume(&bad, true, secrets(5), 2000), Err(JoinRefusal::Over));
     }
     let to = SessionId { epoch: 78, ..id };
-    assert_eq!(sessions.resume(&good, secrets(78), 2000), Ok(to));
-    assert_eq!(sessions.resume(&good, secrets(79), 2000), Err(JoinRefusal::Over));
-    assert_eq!((sessions.count(), taken(&mut sessions)), (1, vec![Change::Resumed { from: id, to }]));
+    assert_eq!(sessions.resume(&good, true, secrets(78), 2000), Ok(to));
+    assert_eq!(sessions.resume(&good, true, secrets(79), 2000), Err(JoinRefusal::Over));
+    assert_eq!(
+        (sessions.count(), taken(&mut sessions)),
+        (1, vec![Change::Resumed { from: id, to, cells_along: true }])
+    );
     // The old connection's words are too late, and the new one counts from 1.
     sessions.token_disappeared(id, 2001);
     assert_eq!(sessions.receive(id.slot, &packet(id.epoch, &[41]), 3, 2002), Err(InputRefusal::NoSession));
@@ -211,7 +214,7 @@ fn whoever_proves_it_resumes_once_in_the_same_slot_with_a_new_epoch_and_key() {
     sessions.expire(7002);
     assert_eq!((sessions.count(), sessions.key(to.slot)), (1, Some(&SessionKey([78; 32]))));
     // Also before anybody has noticed that the connection is gone.
-    assert!(sessions.resume(&of(to, &SessionKey([78; 32])), secrets(80), 7003).is_ok());
+    assert!(sessions.resume(&of(to, &SessionKey([78; 32])), false, secrets(80), 7003).is_ok());
 }
 
 #[test]

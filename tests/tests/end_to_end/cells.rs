@@ -63,10 +63,34 @@ fn busy_field() -> String {
 }
 
 async fn start(arena: &str) -> (ServerProcess, Observer) {
+    start_with(arena, &[]).await
+}
+
+async fn start_with(arena: &str, arguments: &[&str]) -> (ServerProcess, Observer) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("field.toml");
     std::fs::write(&file, arena).unwrap();
-    observed(pita_server().arg("run").arg("--arena").arg(&file)).await
+    observed(pita_server().arg("run").arg("--arena").arg(&file).args(arguments)).await
+}
+
+/// The crates of the field.
+fn crates(player: &Session) -> BTreeSet<u32> {
+    let roster = player.roster();
+    roster.actors().filter(|actor| actor.kind == "prop").map(|actor| actor.parts[0].slice).collect()
+}
+
+/// Plays until one snapshot shows all of `wanted`.
+async fn see_all(player: &Session, wanted: &BTreeSet<u32>) {
+    let until = Instant::now() + SOON;
+    loop {
+        let snapshot = next_snapshot(player).await;
+        let seen: BTreeSet<u32> = snapshot.slices().iter().map(|slice| slice.id).collect();
+        if wanted.is_subset(&seen) {
+            return;
+        }
+        player.send(Default::default()).await.unwrap();
+        assert!(Instant::now() < until, "{seen:?} of {wanted:?}");
+    }
 }
 
 /// One who speaks nothing but Zenoh and looks at one cell: what it has, read from the keyframes on.
@@ -115,9 +139,7 @@ async fn who_looks_where_gets_what_is_there_and_newcomers_begin_at_the_keyframe(
     let (server, observer) = start(FIELD).await;
     // Cells are published while somebody plays.
     let player = connect(&server.endpoint, "player").await;
-    let roster = player.roster();
-    let crates: BTreeSet<u32> =
-        roster.actors().filter(|actor| actor.kind == "prop").map(|actor| actor.parts[0].slice).collect();
+    let crates = crates(&player);
     assert_eq!(crates.len(), 4);
     let of_crates =
         |looker: &Looker| -> BTreeSet<u32> { looker.bodies.keys().copied().filter(|id| crates.contains(id)).collect() };
@@ -131,18 +153,36 @@ async fn who_looks_where_gets_what_is_there_and_newcomers_begin_at_the_keyframe(
     assert_eq!(&west | &east, crates);
 
     // A client takes both, and sees one world.
-    let until = Instant::now() + SOON;
-    loop {
-        let snapshot = next_snapshot(&player).await;
-        let seen: BTreeSet<u32> = snapshot.slices().iter().map(|slice| slice.id).collect();
-        if crates.is_subset(&seen) {
-            break;
-        }
-        player.send(Default::default()).await.unwrap();
-        assert!(Instant::now() < until, "{seen:?} of {crates:?}");
-    }
+    see_all(&player, &crates).await;
     let counts = player.leave().await;
     assert!(counts.keyframes_fetched > 0 && counts.malformed == 0, "{counts:?}");
+    server.stop().unwrap_or_else(|error| panic!("{error}"));
+}
+
+/// What the server says in front of the port of its datagrams.
+const DATAGRAMS: &str = "udp/127.0.0.1:";
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn over_datagrams_cells_come_along_with_the_own_snapshots() {
+    let (mut server, observer) = start_with(FIELD, &["--datagrams", &format!("{DATAGRAMS}0")]).await;
+    let said = server.process.line_with(DATAGRAMS, SOON).unwrap();
+    let port: String = said.split(DATAGRAMS).nth(1).unwrap().chars().take_while(char::is_ascii_digit).collect();
+    // What is put on the slot's key, seen from outside.
+    let listener = observer::open(&server.endpoint).await.unwrap();
+    let messages = listener.declare_subscriber(observer.keys().snapshot(0)).await.unwrap();
+    let player = Session::builder(&server.endpoint, "player").datagrams(&format!("{DATAGRAMS}{port}"));
+    let player = player.connect().await.unwrap();
+    see_all(&player, &crates(&player)).await;
+    let until = Instant::now() + SOON;
+    loop {
+        let message = tokio::time::timeout(SOON, messages.recv_async()).await.expect("the slot's key speaks").unwrap();
+        if decode::<CellSnapshot>(&message.payload().to_bytes()).is_ok() {
+            break;
+        }
+        assert!(Instant::now() < until, "no cell came along");
+    }
+    let counts = player.leave().await;
+    assert!(counts.cells_received > 0 && counts.malformed == 0, "{counts:?}");
     server.stop().unwrap_or_else(|error| panic!("{error}"));
 }
 

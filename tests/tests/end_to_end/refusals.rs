@@ -13,14 +13,26 @@ use crate::{SOON, await_clients, eventually, start_patient_server};
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn joins_that_cannot_be_are_refused_in_words_and_counted() {
     let (server, observer) = start_patient_server().await;
-    let request = encode(&JoinRequest { name: "mallory".into(), role: Role::Player, bytes_per_s: None, resume: None });
+    let request = encode(&JoinRequest {
+        name: "mallory".into(),
+        role: Role::Player,
+        bytes_per_s: None,
+        cells_along: false,
+        resume: None,
+    });
     let mut other_version = request.clone();
     other_version[0] += 1;
     let reply = join(&observer, other_version).await;
     let expected = Refusal::Version { server: PROTOCOL_VERSION, client: PROTOCOL_VERSION + 1 };
     assert!(matches!(&reply, JoinReply::Refused(refusal) if *refusal == expected), "{reply:?}");
 
-    let nameless = encode(&JoinRequest { name: "\n".into(), role: Role::Player, bytes_per_s: None, resume: None });
+    let nameless = encode(&JoinRequest {
+        name: "\n".into(),
+        role: Role::Player,
+        bytes_per_s: None,
+        cells_along: false,
+        resume: None,
+    });
     let malformed =
         [Vec::new(), vec![PROTOCOL_VERSION as u8, 1, 255, 255], request[..4].to_vec(), vec![1; 5000], nameless];
     let malformed_count = malformed.len() as u64;
@@ -104,8 +116,13 @@ struct Mallory<'a> {
 
 impl<'a> Mallory<'a> {
     async fn join(observer: &'a Observer) -> Self {
-        let request =
-            encode(&JoinRequest { name: "mallory".into(), role: Role::Player, bytes_per_s: None, resume: None });
+        let request = encode(&JoinRequest {
+            name: "mallory".into(),
+            role: Role::Player,
+            bytes_per_s: None,
+            cells_along: false,
+            resume: None,
+        });
         match join(observer, request).await {
             JoinReply::Accepted(joined) => Self { observer, joined: *joined },
             JoinReply::Refused(refusal) => panic!("{refusal}"),
