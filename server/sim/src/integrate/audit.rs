@@ -1,6 +1,6 @@
 //! The audit of a tick's energy: what bodies were given by those who may give.
 //!
-//! Owns the work of potentials that put energy in: motors, axles with their springs, anti-roll bars and controllers.
+//! Owns the work of potentials that put energy in: motors, the springs and torques of axles, anti-roll bars and controllers.
 //! Contacts, joints and limits may only take; what springs and elastic bodies hold is part of the world's energy.
 
 use super::problem::{Problem, Terms};
@@ -10,7 +10,8 @@ impl Problem {
     /// Work that potentials put into the island in the tick that is solved, J.
     pub(super) fn work_put_in(&self) -> f64 {
         let Terms { motors, axles, anti_roll_bars, pds, .. } = &self.terms;
-        self.work_of(motors) + self.work_of(axles) + self.work_of(anti_roll_bars) + self.work_of(pds)
+        let axles: f64 = axles.iter().map(|axle| axle.work(self.dt, self.pair(axle))).sum();
+        self.work_of(motors) + axles + self.work_of(anti_roll_bars) + self.work_of(pds)
     }
 
     /// Forces at the end of the tick times the ways that they went.

@@ -84,8 +84,9 @@ pub struct StepReport {
 }
 
 /// Energy that a tick may gain without being a burst: a share of the energy of motion, and so much in any case, J. A tick
-/// that is solved gains nothing but what lifts overlaps apart; one that is not has to pay for its motion (`energy_bound`).
-const BURST: (f64, f64) = (1e-3, 10.0);
+/// gains nothing but what lifts overlaps apart, at up to 1 kJ a tick for a car: one that is not solved has to pay for its
+/// motion (`energy_bound`). An explosion of the numbers is many times more.
+const BURST: (f64, f64) = (1e-2, 100.0);
 
 impl StepReport {
     /// Whether energy came from nowhere, beyond what the scheme may bring about; never unless

@@ -132,6 +132,16 @@ impl AxleTerm {
         travel.x.hypot(travel.z)
     }
 
+    /// Work of spring, drive and brake in the tick, J. The hub and the wheel's plane are held, not pushed, and the damper
+    /// only takes.
+    pub fn work(&self, dt: f64, at: [&Frame<f64>; 2]) -> f64 {
+        let (before, now) = (self.start_travel - self.desc.hub.y, self.travel(at).y);
+        let spring = 0.5 * self.desc.stiffness * (before * before - now * now);
+        let turn = self.spin(at) * dt;
+        let motors = self.motors().map(|(gain, target, limit)| -clamped(gain, self.spin(at) - target, limit).1 * turn);
+        spring + motors.iter().sum::<f64>()
+    }
+
     fn spin<S: Scalar>(&self, [chassis, wheel]: [&Frame<S>; 2]) -> S {
         (wheel.angular - chassis.angular).along(self.spin_axis)
     }

@@ -90,7 +90,7 @@ fn what_is_not_solved_gains_nothing() {
     for tick in 0..90 {
         let report = world.step();
         stopped += report.out_of_budget_islands;
-        assert!(!report.is_energy_burst(), "tick {tick}: {report:?}");
+        assert!(report.energy_gain < 1e-3 * report.kinetic_energy + 10.0, "tick {tick}: {report:?}");
     }
     assert!(stopped > 30, "{stopped} islands ran out of budget");
 }
