@@ -14,16 +14,30 @@ const LEAST: u64 = 1 << 32;
 
 /// One direction of the entropy coder.
 pub trait Coder {
-    /// Codes one of `N` symbols; symbol i has what lies from `bounds[i − 1]` (0 for the first) to `bounds[i]`. The last of
-    /// `bounds` is the largest `i16`, and stands for the [`WHOLE`]. An encoder writes `symbol` and answers it; a decoder
-    /// ignores `symbol` and answers what was written.
-    fn symbol<const N: usize>(&mut self, symbol: usize, bounds: &[i16; N]) -> usize;
+    /// Whether it is an encoder, which has to be told what to write.
+    const WRITES: bool;
+
+    /// Codes one of `N` symbols, a power of two; symbol i has what lies from `starts[i]`, 0 for the first, to
+    /// `starts[i + 1]`, the [`WHOLE`] for the last. An encoder writes `symbol` and answers it; a decoder ignores `symbol`
+    /// and answers what was written.
+    fn symbol<const N: usize>(&mut self, symbol: usize, starts: &[i16; N]) -> usize;
 
     /// Codes one bit whose probability of being 1 is `p`, more than 0 and less than [`WHOLE`].
     fn bit(&mut self, bit: bool, p: u32) -> bool;
 
-    /// Codes the low `count` bits of `value`, at most 32, each as likely as not: the high 16 first, then the others.
-    fn raw(&mut self, value: u32, count: u32) -> u32;
+    /// Codes the low `count` bits of `value`, at most [`FEW`], each as likely as not.
+    fn few(&mut self, value: u32, count: u32) -> u32;
+
+    /// The same of at most 32 bits: the high [`FEW`] first, then the others.
+    fn raw(&mut self, value: u32, count: u32) -> u32 {
+        let (mut read, mut left) = (0, count);
+        while left > 0 {
+            let part = left.min(FEW);
+            left -= part;
+            read = read << part | self.few(value >> left, part);
+        }
+        read
+    }
 
     /// Whether a decoder has read everything, and nothing else: false for data that no encoder writes.
     fn is_finished(&self) -> bool;
@@ -33,16 +47,15 @@ pub trait Coder {
 }
 
 /// What a symbol has of the [`WHOLE`].
-fn interval<const N: usize>(symbol: usize, bounds: &[i16; N]) -> (u32, u32) {
-    let start = if symbol == 0 { 0 } else { bounds[symbol - 1] as u32 };
-    let end = if symbol == N - 1 { WHOLE } else { bounds[symbol] as u32 };
+#[inline]
+fn interval<const N: usize>(symbol: usize, starts: &[i16; N]) -> (u32, u32) {
+    let start = starts[symbol] as u32;
+    let end = starts.get(symbol + 1).map_or(WHOLE, |&end| end as u32);
     (start, end - start)
 }
 
-/// Bits of a raw number that are coded at once.
-fn raw_parts(count: u32) -> [u32; 3] {
-    [count.min(14), count.saturating_sub(14).min(14), count.saturating_sub(28)]
-}
+/// Bits that are coded at once at most.
+pub const FEW: u32 = 14;
 
 /// Writes choices.
 pub struct Encoder<'a> {
@@ -60,6 +73,7 @@ impl<'a> Encoder<'a> {
         Self { choices, bits: 0, part: 1 << 32 }
     }
 
+    #[inline]
     fn choose(&mut self, (start, width): (u32, u32)) {
         // Widths are below the whole: nothing that is certain is coded.
         self.choices.push((start as u16, width as u16));
@@ -88,9 +102,11 @@ impl<'a> Encoder<'a> {
 }
 
 impl Coder for Encoder<'_> {
+    const WRITES: bool = true;
+
     #[inline]
-    fn symbol<const N: usize>(&mut self, symbol: usize, bounds: &[i16; N]) -> usize {
-        self.choose(interval(symbol, bounds));
+    fn symbol<const N: usize>(&mut self, symbol: usize, starts: &[i16; N]) -> usize {
+        self.choose(interval(symbol, starts));
         symbol
     }
 
@@ -100,14 +116,11 @@ impl Coder for Encoder<'_> {
         bit
     }
 
-    fn raw(&mut self, value: u32, count: u32) -> u32 {
-        let mut left = count;
-        for part in raw_parts(count).into_iter().filter(|&part| part > 0) {
-            left -= part;
-            let bits = value >> left & ((1 << part) - 1);
-            self.choose((bits << (BITS - part), WHOLE >> part));
-        }
-        value
+    #[inline]
+    fn few(&mut self, value: u32, count: u32) -> u32 {
+        let bits = value & ((1 << count) - 1);
+        self.choose((bits << (BITS - count), WHOLE >> count));
+        bits
     }
 
     fn is_finished(&self) -> bool {
@@ -134,6 +147,7 @@ impl<'a> Decoder<'a> {
         Self { state: head.iter().fold(0, |state, &byte| state << 8 | u64::from(byte)), words }
     }
 
+    #[inline]
     fn slot(&self) -> u32 {
         self.state as u32 & (WHOLE - 1)
     }
@@ -151,12 +165,16 @@ impl<'a> Decoder<'a> {
 }
 
 impl Coder for Decoder<'_> {
+    const WRITES: bool = false;
+
     #[inline]
-    fn symbol<const N: usize>(&mut self, _: usize, bounds: &[i16; N]) -> usize {
+    fn symbol<const N: usize>(&mut self, _: usize, starts: &[i16; N]) -> usize {
+        const { assert!(N.is_power_of_two()) };
         let slot = self.slot() as i16;
-        let below = bounds.iter().map(|&bound| i16::from(bound <= slot)).sum::<i16>();
-        let symbol = (below as usize).min(N - 1);
-        self.take(interval(symbol, bounds));
+        // The first start is beyond no slot. To count all at once is faster than to search.
+        let begun = starts.iter().map(|&start| i16::from(start <= slot)).sum::<i16>();
+        let symbol = (begun as usize).wrapping_sub(1) % N;
+        self.take(interval(symbol, starts));
         symbol
     }
 
@@ -167,14 +185,11 @@ impl Coder for Decoder<'_> {
         bit
     }
 
-    fn raw(&mut self, _: u32, count: u32) -> u32 {
-        let mut value = 0;
-        for part in raw_parts(count).into_iter().filter(|&part| part > 0) {
-            let bits = self.slot() >> (BITS - part);
-            self.take((bits << (BITS - part), WHOLE >> part));
-            value = value << part | bits;
-        }
-        value
+    #[inline]
+    fn few(&mut self, _: u32, count: u32) -> u32 {
+        let bits = self.slot() >> (BITS - count);
+        self.take((bits << (BITS - count), WHOLE >> count));
+        bits
     }
 
     fn is_finished(&self) -> bool {
@@ -196,13 +211,13 @@ mod tests {
         fn what_is_written_is_read(
             bits in prop::collection::vec((any::<bool>(), 1u32..WHOLE, any::<u32>(), 0u32..=32, 0usize..4), 0..600),
         ) {
-            let bounds = [1, 700, 32_000, i16::MAX];
+            let starts = [0, 1, 700, 32_000];
             let (mut choices, mut bytes) = (vec![(1, 1)], vec![7]);
             let mut encoder = Encoder::new(&mut choices);
             for &(bit, p, value, count, symbol) in &bits {
                 encoder.bit(bit, p);
                 encoder.raw(value, count);
-                encoder.symbol(symbol, &bounds);
+                encoder.symbol(symbol, &starts);
             }
             let written = encoder.written();
             encoder.finish(&mut bytes);
@@ -212,7 +227,7 @@ mod tests {
             for &(bit, p, value, count, symbol) in &bits {
                 prop_assert_eq!(decoder.bit(false, p), bit);
                 prop_assert_eq!(decoder.raw(0, count), (u64::from(value) & ((1u64 << count) - 1)) as u32);
-                prop_assert_eq!(decoder.symbol(0, &bounds), symbol);
+                prop_assert_eq!(decoder.symbol(0, &starts), symbol);
             }
             prop_assert!(decoder.is_finished());
         }

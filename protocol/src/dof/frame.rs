@@ -139,6 +139,13 @@ impl Frame {
         Self { tick: 0, precision, bodies: Vec::new(), ticks: Vec::new(), groups: Vec::new(), models: Box::default() }
     }
 
+    /// Forgets all bodies, and keeps the memory.
+    pub(super) fn clear(&mut self) {
+        self.bodies.clear();
+        self.ticks.clear();
+        self.groups.clear();
+    }
+
     /// Tick of the snapshot.
     pub fn tick(&self) -> u64 {
         self.tick
@@ -169,24 +176,20 @@ impl Frame {
         let mut sum = 0u64;
         for (index, group) in self.groups.iter().enumerate() {
             let Quantised { largest, steps: [a, b, c], .. } = group.value;
-            sum = sum.wrapping_add(mixed([index as u32, largest.into(), a as u32, b as u32, c as u32]));
+            sum = sum.wrapping_add(mixed([a as u32, b as u32, c as u32, (index as u32) << 2 | u32::from(largest)]));
         }
         for (body, tick) in self.bodies() {
-            sum = sum.wrapping_add(mixed([body.id, tick as u32, body.start, 0, 0]));
+            sum = sum.wrapping_add(mixed([body.id, tick as u32, body.start, 0]));
         }
         (sum >> 48) as u16
     }
 }
 
-/// A hash of five numbers: its parts do not wait for each other.
-fn mixed(numbers: [u32; 5]) -> u64 {
-    const FACTORS: [u64; 5] = [
-        0x9E37_79B9_7F4A_7C15,
-        0xBF58_476D_1CE4_E5B9,
-        0x94D0_49BB_1331_11EB,
-        0xD6E8_FEB8_6659_FD93,
-        0xA076_1D64_78BD_642F,
-    ];
-    let sum = numbers.iter().zip(FACTORS).fold(0u64, |sum, (&x, by)| sum.wrapping_add(u64::from(x).wrapping_mul(by)));
-    (sum ^ sum >> 32).wrapping_mul(FACTORS[1])
+/// A hash of four numbers: its parts do not wait for each other.
+#[inline]
+fn mixed([a, b, c, d]: [u32; 4]) -> u64 {
+    const FACTORS: [u64; 3] = [0x9E37_79B9_7F4A_7C15, 0xBF58_476D_1CE4_E5B9, 0x94D0_49BB_1331_11EB];
+    let pair = |low: u32, high: u32| u64::from(high) << 32 | u64::from(low);
+    let sum = pair(a, b).wrapping_mul(FACTORS[0]).wrapping_add(pair(c, d).wrapping_mul(FACTORS[1]));
+    (sum ^ sum >> 32).wrapping_mul(FACTORS[2])
 }

@@ -1,6 +1,6 @@
 //! Adaptive models: what probability the next choice has.
 //!
-//! A [`Bit`] counts one context of yes and no, [`Symbols`] one of a small alphabet, as bounds that move towards what was
+//! A [`Bit`] counts one context of yes and no, [`Symbols`] one of a small alphabet, as starts that move towards what was
 //! seen. All arithmetic is on integers, of [`Symbols`] as many side by side as a processor has lanes, and both sides agree
 //! to the last bit.
 
@@ -24,6 +24,7 @@ impl Bit {
     pub const NEW: Self = Self { p: 1 << 15, seen: 0 };
 
     /// Codes a bit in this context.
+    #[inline]
     pub fn code(&mut self, coder: &mut impl Coder, bit: bool) -> bool {
         let bit = coder.bit(bit, u32::from(self.p >> 1).max(1));
         let target = if bit { 65536 - EDGE } else { EDGE };
@@ -35,12 +36,11 @@ impl Bit {
     }
 }
 
-/// Probabilities of `N` symbols in each of `K` contexts: where each symbol ends, of 2^15. The last one ends with the whole,
-/// for which the largest number of 16 bits stands.
+/// Probabilities of `N` symbols in each of `K` contexts: where each symbol starts, of 2^15; the first one at 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[repr(align(64))]
 pub struct Symbols<const N: usize, const K: usize> {
-    bounds: [[i16; N]; K],
+    starts: [[i16; N]; K],
     /// How often each context was used, as far as that matters.
     seen: [u8; K],
 }
@@ -54,23 +54,23 @@ const SLOWNESS: [u8; 32] =
 impl<const N: usize, const K: usize> Symbols<N, K> {
     /// All symbols alike.
     pub const NEW: Self = {
-        let mut bounds = [i16::MAX; N];
+        let mut starts = [0; N];
         let mut i = 0;
-        while i < N - 1 {
-            bounds[i] = (WHOLE as usize * (i + 1) / N) as i16;
+        while i < N {
+            starts[i] = (WHOLE as usize * i / N) as i16;
             i += 1;
         }
-        Self { bounds: [bounds; K], seen: [0; K] }
+        Self { starts: [starts; K], seen: [0; K] }
     };
 
-    /// Where the bounds go when a symbol is seen, by symbol.
+    /// Where the starts go when a symbol is seen, by symbol.
     const TARGETS: [[i16; N]; N] = {
-        let mut targets = [[i16::MAX; N]; N];
+        let mut targets = [[0; N]; N];
         let mut at = 0;
-        while at < N * (N - 1) {
-            let (symbol, i) = (at / (N - 1), at % (N - 1));
-            let bound = if i < symbol { FLOOR * (i + 1) } else { WHOLE as usize - FLOOR * (N - 1 - i) };
-            targets[symbol][i] = bound as i16;
+        while at < N * N {
+            let (symbol, i) = (at / N, at % N);
+            let start = if i <= symbol { FLOOR * i } else { WHOLE as usize - FLOOR * (N - i) };
+            targets[symbol][i] = start as i16;
             at += 1;
         }
         targets
@@ -79,11 +79,11 @@ impl<const N: usize, const K: usize> Symbols<N, K> {
     /// Codes a symbol in a context.
     #[inline]
     pub fn code(&mut self, coder: &mut impl Coder, context: usize, symbol: usize) -> usize {
-        let (bounds, seen) = (&mut self.bounds[context], &mut self.seen[context]);
-        let symbol = coder.symbol(symbol, bounds);
-        let slowness = SLOWNESS[usize::from(*seen)] & 15;
-        for (bound, target) in bounds.iter_mut().zip(&Self::TARGETS[symbol]) {
-            *bound += (target - *bound) >> slowness;
+        let (starts, seen) = (&mut self.starts[context], &mut self.seen[context]);
+        let symbol = coder.symbol(symbol, starts);
+        let slowness = SLOWNESS[usize::from(*seen) % SLOWNESS.len()] & 15;
+        for (start, target) in starts.iter_mut().zip(&Self::TARGETS[symbol]) {
+            *start += (target - *start) >> slowness;
         }
         *seen = (*seen + 1).min(SLOWNESS.len() as u8 - 1);
         symbol

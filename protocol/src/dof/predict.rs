@@ -9,7 +9,7 @@
 //!
 //! What has stayed for long has no track: it is **calm**, and costs nothing to predict.
 
-use super::quantise::{Group, Precision, Quantised, STEPS_MAX, others};
+use super::quantise::{Fineness, Group, Precision, Quantised, STEPS_MAX, others};
 use super::quaternion::{ONE, Quaternion};
 
 /// Guesses of a group.
@@ -24,6 +24,8 @@ const RATE_MAX: i64 = 1 << 28;
 /// Largest distance of a point's track from its state, and largest miss of it that counts, 2^12 of a step.
 const PLACE_MAX: i64 = 1 << 30;
 const MISS_MAX: i64 = 1 << 36;
+/// Misses of a rotation from this on, of 2^30, are not small: its track begins anew at its value.
+const SMALL_MISS: u64 = 1 << 24;
 /// Ticks that a prediction goes ahead at most.
 const AHEAD_MAX: i64 = 128;
 /// States that a line is fitted through at most; more would not follow what turns.
@@ -61,23 +63,23 @@ pub struct GroupState {
     rate: [i32; 4],
 }
 
-/// What is expected of a group.
+/// Where a group's track leads in so many ticks.
 #[derive(Clone, Copy, Debug)]
-pub struct Prediction {
-    track: Track,
-    goes_by_track: bool,
+pub struct Track {
+    place: Place,
     /// Ticks from the baseline.
     ahead: i64,
 }
 
-/// Where a track leads.
+/// Where a track is.
 #[derive(Clone, Copy, Debug)]
-enum Track {
-    /// Nowhere.
-    Calm,
+enum Place {
     /// Coordinates in 2^12 of a step.
     Line([i64; 3]),
-    Rotation(Quaternion),
+    /// A rotation that has no track.
+    Still,
+    /// A rotation.
+    Turned(Quaternion),
 }
 
 impl GroupState {
@@ -112,70 +114,77 @@ impl GroupState {
         self.fitted == 0
     }
 
-    /// What is expected `ahead` ticks on.
-    pub fn predict(&self, ahead: i64) -> Prediction {
+    /// Where the track leads in `ahead` ticks.
+    #[inline]
+    pub fn track(&self, ahead: i64) -> Track {
         let ahead = ahead.clamp(1, AHEAD_MAX);
-        let track = match self.value.group {
-            _ if self.is_calm() => Track::Calm,
+        let place = match self.value.group {
+            Group::Rotation if self.is_calm() => Place::Still,
             Group::Rotation => {
                 let turn = Quaternion(self.rate.map(i64::from)).power(ahead as u32);
-                Track::Rotation(turn.times(Quaternion(self.place.map(i64::from))))
+                Place::Turned(turn.times(Quaternion(self.place.map(i64::from))))
             }
-            _ => Track::Line([0, 1, 2].map(|i| {
+            _ => Place::Line([0, 1, 2].map(|i| {
                 let place = (i64::from(self.value.steps[i]) << FRACTION) + i64::from(self.place[i]);
                 place + i64::from(self.rate[i]) * ahead
             })),
         };
-        Prediction { track, goes_by_track: self.errors[TRACK] <= self.errors[REST], ahead }
+        Track { place, ahead }
     }
-}
 
-impl Prediction {
-    /// The state that is expected after `base`; `largest` is the component that a rotation leaves out, where that is known.
-    pub fn expected(&self, base: &GroupState, largest: Option<u8>, precision: &Precision) -> Quantised {
-        match &self.track {
-            Track::Line(track) if self.goes_by_track => {
+    /// The state that is expected next, by the guess that was less wrong of late.
+    #[inline]
+    pub fn expected(&self, track: &Track, fineness: &Fineness) -> Quantised {
+        match &track.place {
+            _ if self.errors[TRACK] > self.errors[REST] => self.value,
+            Place::Line(track) => {
                 let steps = track.map(|x| {
                     let step = (x + (1 << (FRACTION - 1))) >> FRACTION;
                     step.clamp(-i64::from(STEPS_MAX), STEPS_MAX.into()) as i32
                 });
-                Quantised { steps, ..base.value }
+                Quantised { steps, ..self.value }
             }
-            Track::Rotation(track) if self.goes_by_track => rounded(track, largest, precision),
-            _ if largest.is_none_or(|largest| largest == base.value.largest) => base.value,
-            _ => rounded(&Quaternion(base.value.components(precision)), largest, precision),
+            Place::Still => self.value,
+            Place::Turned(track) => rounded(track, track.largest(), fineness),
         }
     }
 
-    /// The state after `base`, now that the value is known.
-    pub fn update(&self, base: &GroupState, value: Quantised, precision: &Precision) -> GroupState {
-        let is_same = value.largest == base.value.largest;
-        let moved: u64 = value.steps.iter().zip(base.value.steps).map(|(a, b)| u64::from(a.abs_diff(b))).sum();
-        let moved = if is_same { moved * u64::from(STEP_ERROR) } else { ERROR_MAX };
-        let mut next = GroupState { value, ..*base };
-        next.errors[REST] = learnt(base.errors[REST], moved);
-        if moved == 0 && (base.is_calm() || next.errors[REST] == 0) {
-            next.fitted = 0;
-            next.errors[TRACK] = learnt(base.errors[TRACK], 0);
-            (next.place, next.rate) = ([0; 4], [0; 4]);
-            return next;
+    /// The same of a rotation that leaves out its component `largest`.
+    #[inline(never)]
+    pub fn expected_without(&self, largest: usize, track: &Track, fineness: &Fineness) -> Quantised {
+        match &track.place {
+            Place::Turned(track) if self.errors[TRACK] <= self.errors[REST] => rounded(track, largest, fineness),
+            _ if largest == usize::from(self.value.largest) => self.value,
+            _ => rounded(&Quaternion(self.value.components(fineness)), largest, fineness),
         }
-        let wrong = match (value.group, &self.track) {
-            (Group::Rotation, Track::Rotation(track)) => next.follow_rotation(track, self.ahead, precision),
-            (Group::Rotation, _) => {
-                next.rate = Quaternion::NONE.0.map(|x| x as i32);
-                next.follow_rotation(&Quaternion(base.value.components(precision)), self.ahead, precision)
+    }
+
+    /// Goes on to `value`, which was expected where `track` led.
+    #[inline]
+    pub fn follow(&mut self, track: &Track, value: Quantised, fineness: &Fineness) {
+        let (was_calm, old) = (self.is_calm(), std::mem::replace(&mut self.value, value));
+        let moved: u64 = value.steps.iter().zip(old.steps).map(|(a, b)| u64::from(a.abs_diff(b))).sum();
+        let moved = if value.largest == old.largest { moved * u64::from(STEP_ERROR) } else { ERROR_MAX };
+        self.errors[REST] = learnt(self.errors[REST], moved);
+        if moved == 0 && (was_calm || self.errors[REST] == 0) {
+            self.fitted = 0;
+            self.errors[TRACK] = learnt(self.errors[TRACK], 0);
+            (self.place, self.rate) = ([0; 4], [0; 4]);
+            return;
+        }
+        let wrong = match &track.place {
+            Place::Line(place) => self.follow_line(place, track.ahead),
+            Place::Turned(place) => self.follow_rotation(place, track.ahead, fineness),
+            Place::Still => {
+                self.rate = Quaternion::NONE.0.map(|x| x as i32);
+                self.follow_rotation(&Quaternion(old.components(fineness)), track.ahead, fineness)
             }
-            (_, Track::Line(track)) => next.follow_line(track, self.ahead),
-            _ => next.follow_line(&base.value.steps.map(|step| i64::from(step) << FRACTION), self.ahead),
         };
-        next.errors[TRACK] = learnt(base.errors[TRACK], wrong);
-        next
+        self.errors[TRACK] = learnt(self.errors[TRACK], wrong);
     }
-}
 
-impl GroupState {
     /// Fits the line to a value that it missed: `track` is where it led in `ahead` ticks. Answers by how much.
+    #[inline]
     fn follow_line(&mut self, track: &[i64; 3], ahead: i64) -> u64 {
         let miss = [0, 1, 2].map(|i| {
             let miss = (i64::from(self.value.steps[i]) << FRACTION) - track[i];
@@ -193,18 +202,17 @@ impl GroupState {
     }
 
     /// The same for a rotation.
-    fn follow_rotation(&mut self, track: &Quaternion, ahead: i64, precision: &Precision) -> u64 {
-        let now = Quaternion(self.value.components(precision));
-        let Quaternion([x, y, z, _]) = now.times(track.conjugate()).upright();
+    fn follow_rotation(&mut self, track: &Quaternion, ahead: i64, fineness: &Fineness) -> u64 {
+        let now = Quaternion(self.value.components(fineness));
         // Half the angle, of 2^30, which is as far as components move.
-        let miss = [x, y, z];
-        let steps = i64::from(precision.rotation);
-        let error = (miss.iter().map(|miss| miss.unsigned_abs()).sum::<u64>() * steps.unsigned_abs()) >> (30 - 4);
-        let (place, rate) = self.shares(miss, ONE / steps);
+        let miss = now.times(track.conjugate()).upright().axis();
+        let error = (miss.iter().map(|miss| miss.unsigned_abs()).sum::<u64>() * fineness.steps as u64) >> (30 - 4);
+        let (place, rate) = self.shares(miss, fineness.step);
         let rate = rate * RECIPROCALS[ahead as usize];
-        let place = match self.fitted {
-            2 => now,
-            _ => Quaternion::small(miss.map(|m| (place * m) >> 8)).times(*track),
+        let bits = miss.iter().fold(0, |bits, m| bits | m.unsigned_abs());
+        let (place, miss) = match bits < SMALL_MISS {
+            true => (Quaternion::small(miss.map(|m| (place * m) >> 8)).times(*track), miss),
+            false => (now, miss.map(|m| m.clamp(-ONE / 2, ONE / 2))),
         };
         let turn = Quaternion(self.rate.map(i64::from));
         let rate = Quaternion::small(miss.map(|m| (rate * m) >> 24)).times(turn).normalised();
@@ -214,6 +222,7 @@ impl GroupState {
     }
 
     /// Shares of a miss, of 2^8, as place and as rate; who misses by more than one and a half steps begins a new line.
+    #[inline]
     fn shares(&mut self, miss: [i64; 3], step: i64) -> (i64, i64) {
         let worst = miss.iter().map(|m| m.abs()).max().unwrap_or(0);
         self.fitted = if 2 * worst > 3 * step { 2 } else { (self.fitted + 1).clamp(2, FITTED_MAX) };
@@ -222,15 +231,15 @@ impl GroupState {
 }
 
 /// An error after another one: a quarter of the old one goes each time.
+#[inline]
 fn learnt(error: u16, now: u64) -> u16 {
     ((u64::from(error) * 3 + now.min(ERROR_MAX)) / 4) as u16
 }
 
-fn rounded(q: &Quaternion, largest: Option<u8>, precision: &Precision) -> Quantised {
-    let own = || (1..4).fold(0, |best, i| if q.0[i].abs() > q.0[best].abs() { i } else { best });
-    let largest = largest.map_or_else(own, usize::from);
-    let sign = if q.0[largest] < 0 { -1 } else { 1 };
-    let scale = sign * i64::from(precision.rotation);
+/// The steps of `q` without its component `largest`.
+#[inline]
+fn rounded(q: &Quaternion, largest: usize, fineness: &Fineness) -> Quantised {
+    let scale = if q.0[largest] < 0 { -fineness.steps } else { fineness.steps };
     let steps = others(largest).map(|i| ((q.0[i] * scale + (1 << 29)) >> 30) as i32);
     Quantised { group: Group::Rotation, largest: largest as u8, steps }
 }

@@ -67,6 +67,12 @@ impl Precision {
         require((64..=8192).contains(&self.rotation), "rotation steps", "64 to 8192")
     }
 
+    /// How fine rotations are.
+    pub(super) fn fineness(&self) -> Fineness {
+        let steps = i64::from(self.rotation);
+        Fineness { steps, step: ONE / steps, square: steps.unsigned_abs().pow(2) }
+    }
+
     pub(super) fn steps(&self, group: Group) -> f64 {
         f64::from(match group {
             Group::Point => self.point,
@@ -75,6 +81,17 @@ impl Precision {
             Group::Rate => self.rate,
         })
     }
+}
+
+/// How fine rotations are, with what is worked out of it once for all.
+#[derive(Clone, Copy, Debug)]
+pub struct Fineness {
+    /// Steps per 1 of a component.
+    pub steps: i64,
+    /// A step, of 2^30.
+    pub step: i64,
+    /// What squares of a rotation's steps add up to at most.
+    square: u64,
 }
 
 /// Largest size of a quantised number, steps.
@@ -127,23 +144,21 @@ impl Quantised {
 
     /// # Errors
     /// [`WireError::Content`] for what no state has.
-    pub(super) fn check(&self, precision: &Precision) -> Result<(), WireError> {
+    #[inline]
+    pub(super) fn check(&self, fineness: &Fineness) -> Result<(), WireError> {
         require(self.steps.iter().all(|s| s.unsigned_abs() <= STEPS_MAX as u32), "steps", "at most 2^26 in size")?;
         let square: u64 = self.steps.iter().map(|&s| u64::from(s.unsigned_abs()).pow(2)).sum();
-        let is_unit = self.group != Group::Rotation || square <= u64::from(precision.rotation).pow(2);
+        let is_unit = self.group != Group::Rotation || square <= fineness.square;
         require(is_unit, "steps of a rotation", "at most a unit quaternion's")
     }
 
     /// The rotation's components of 2^30; see [`ONE`].
-    pub(super) fn components(&self, precision: &Precision) -> [i64; 4] {
+    #[inline]
+    pub(super) fn components(&self, fineness: &Fineness) -> [i64; 4] {
+        let sent = self.steps.map(|steps| i64::from(steps) * fineness.step);
         let mut all = [0; 4];
-        let mut rest = ONE * ONE;
-        let step = ONE / i64::from(precision.rotation);
-        for (i, steps) in others(self.largest.into()).into_iter().zip(self.steps) {
-            all[i] = i64::from(steps) * step;
-            rest -= all[i] * all[i];
-        }
-        all[usize::from(self.largest)] = isqrt(rest);
+        others(self.largest.into()).into_iter().zip(sent).for_each(|(i, x)| all[i] = x);
+        all[usize::from(self.largest) % 4] = isqrt(ONE * ONE - sent.iter().map(|x| x * x).sum::<i64>());
         all
     }
 }
@@ -156,7 +171,7 @@ fn unit(q: [f64; 4]) -> [f64; 4] {
 
 /// The three components of a quaternion that are sent where `largest` is not.
 pub(super) fn others(largest: usize) -> [usize; 3] {
-    [0, 1, 2].map(|i| if i < largest { i } else { i + 1 })
+    [0, 1, 2].map(|i| i + usize::from(i >= largest))
 }
 
 /// Body `q` (position and quaternion) as `parent` sees it: what attached bodies are coded as.

@@ -14,13 +14,28 @@ impl Quaternion {
     /// No rotation.
     pub const NONE: Self = Self([0, 0, 0, ONE]);
 
+    /// The component of largest size, the first of equals.
+    #[inline]
+    pub fn largest(&self) -> usize {
+        (1..4).fold(0, |best, i| if self.0[i].abs() > self.0[best].abs() { i } else { best })
+    }
+
+    /// x, y and z.
+    #[inline]
+    pub fn axis(self) -> [i64; 3] {
+        let [x, y, z, _] = self.0;
+        [x, y, z]
+    }
+
     /// The rotation backwards.
+    #[inline]
     pub fn conjugate(self) -> Self {
         let [x, y, z, w] = self.0;
         Self([-x, -y, -z, w])
     }
 
     /// First `other`, then this.
+    #[inline]
     pub fn times(self, other: Self) -> Self {
         let ([ax, ay, az, aw], [bx, by, bz, bw]) = (self.0, other.0);
         Self([
@@ -32,6 +47,7 @@ impl Quaternion {
     }
 
     /// The rotation twice.
+    #[inline]
     fn squared(self) -> Self {
         let [x, y, z, w] = self.0;
         let [tx, ty, tz] = [x, y, z].map(|c| (2 * w * c) >> BITS);
@@ -39,6 +55,7 @@ impl Quaternion {
     }
 
     /// The rotation `n` times.
+    #[inline]
     pub fn power(self, n: u32) -> Self {
         let mut power = if n & 1 == 1 { self } else { Self::NONE };
         let (mut left, mut doubled) = (n >> 1, self);
@@ -53,17 +70,21 @@ impl Quaternion {
     }
 
     /// The same rotation with w ≥ 0.
+    #[inline]
     pub fn upright(self) -> Self {
-        if self.0[3] < 0 { Self(self.0.map(|c| -c)) } else { self }
+        // Either sign is as likely: no branch.
+        let sign = self.0[3] >> 63;
+        Self(self.0.map(|c| (c ^ sign) - sign))
     }
 
     /// Nearly the rotation by the rotation vector twice `half`, rad of 2^30, at most half a radian in each component.
-    pub fn small(half: [i64; 3]) -> Self {
-        let [x, y, z] = half.map(|x| x.clamp(-ONE / 2, ONE / 2));
+    #[inline]
+    pub fn small([x, y, z]: [i64; 3]) -> Self {
         Self([x, y, z, ONE - ((x * x + y * y + z * z) >> (BITS + 1))])
     }
 
     /// Nearer to length 1, which it is not far from.
+    #[inline]
     pub fn normalised(self) -> Self {
         let square = self.0.iter().map(|c| c * c).sum::<i64>() >> BITS;
         let factor = (3 * ONE - square) >> 1;
@@ -72,6 +93,7 @@ impl Quaternion {
 }
 
 /// The integer part of the square root; 0 for what is negative. At most 2^62.
+#[inline]
 pub fn isqrt(x: i64) -> i64 {
     let x = x.max(0);
     // Within 1 of it, by whatever floating point; what follows is exact.
@@ -117,7 +139,7 @@ mod tests {
 
         /// What a track adds up is a rotation to within 2^-20 after any miss, and nothing overflows on the way.
         #[test]
-        fn corrections_keep_the_length(v in prop::array::uniform3(-2.0f64..2.0), half in prop::array::uniform3(-ONE..ONE)) {
+        fn corrections_keep_the_length(v in prop::array::uniform3(-2.0f64..2.0), half in prop::array::uniform3(-ONE / 2..=ONE / 2)) {
             let mut turn = rotation(v);
             for _ in 0..100 {
                 turn = Quaternion::small(half).times(turn).normalised();

@@ -6,8 +6,8 @@
 
 use super::ans::Coder;
 use super::model::{Bit, Symbols};
-use super::predict::{GroupState, Prediction};
-use super::quantise::{Group, Precision, Quantised, others};
+use super::predict::GroupState;
+use super::quantise::{Fineness, Group, Quantised, others};
 use crate::{WireError, codec::require};
 
 const GROUPS: usize = 4;
@@ -17,6 +17,18 @@ const NEAR: usize = 3;
 
 /// Patterns of up to three components of 0, 1, or 2 and more steps each; the first of them counts 1, the second 3.
 const PATTERNS: usize = 27;
+/// Patterns of groups, by their kind.
+const PATTERNS_OF: [usize; GROUPS] = [27, 27, 3, 27];
+/// The classes of a pattern's components: 0, 1, or 2 and more steps.
+const CLASSES: [[u32; 3]; PATTERNS] = {
+    let mut classes = [[0; 3]; PATTERNS];
+    let mut i = 0;
+    while i < PATTERNS {
+        classes[i] = [i as u32 % 3, i as u32 / 3 % 3, i as u32 / 9];
+        i += 1;
+    }
+    classes
+};
 /// A group's first symbol: a pattern, or, from [`PATTERNS`] on, which other component of a rotation is left out.
 type First = Symbols<32, { GROUPS * ERRORS * NEAR }>;
 /// How much more than 2 a component is off: below 8 as it is, then by the number of its bits.
@@ -76,74 +88,73 @@ impl Models {
         (zigzag >> 1) as i32 ^ -((zigzag & 1) as i32)
     }
 
-    /// Codes the state of a group that is predicted from `base`; `value` is what an encoder has, `sibling` the size of the
-    /// residual of this body's last group, steps. Answers the state and the size of its residual.
+    /// Codes a group that goes on from `state`, whose track leads to `track`; `value` is what an encoder has, `sibling` the
+    /// size of the residual of this body's last group, steps. Answers the size of its residual.
     ///
     /// # Errors
     /// [`WireError::Content`] for a number that no state has.
-    pub fn group(
+    #[inline]
+    pub fn group<C: Coder>(
         &mut self,
-        coder: &mut impl Coder,
-        base: &GroupState,
-        prediction: &Prediction,
+        coder: &mut C,
+        state: &mut GroupState,
+        ahead: i64,
         sibling: Option<u32>,
         value: Option<&Quantised>,
-        precision: &Precision,
-    ) -> Result<(Quantised, u32), WireError> {
-        let kind = base.value.group;
-        let g = kind as usize;
-        let error = error_bucket(base.expected_error());
+        fineness: &Fineness,
+    ) -> Result<u32, WireError> {
+        let kind = state.value.group;
+        let error = error_bucket(state.expected_error());
         let near = sibling.map_or(0, |size| 1 + usize::from(size > 0));
-        let context = (g * ERRORS + error.min(ERRORS - 1)) * NEAR + near;
+        let context = (kind as usize * ERRORS + error.min(ERRORS - 1)) * NEAR + near;
 
-        let mut expected = prediction.expected(base, None, precision);
+        let track = state.track(ahead);
+        let mut expected = state.expected(&track, fineness);
         let mut first = self.first.code(coder, context, first_symbol(&expected, value));
         if kind == Group::Rotation && first >= PATTERNS {
             let others = others(expected.largest.into());
             require(first < PATTERNS + others.len(), "first symbol", "at most 29")?;
-            expected = prediction.expected(base, Some(others[first - PATTERNS] as u8), precision);
+            expected = state.expected_without(others[first - PATTERNS], &track, fineness);
             first = self.first.code(coder, context, first_symbol(&expected, value));
         }
-        if first == 0 {
-            return Ok((expected, 0));
+        let mut size = 0;
+        if first != 0 {
+            size = self.steps(coder, first, &mut expected, error, value)?;
+            expected.check(fineness)?;
         }
-        let patterns = PATTERNS.min(3usize.pow(kind.components() as u32));
-        require(first < patterns, "first symbol", "a pattern of the group's components")?;
-        self.steps(coder, first, expected, error, value, precision)
+        state.follow(&track, expected, fineness);
+        Ok(size)
     }
 
-    /// The steps of a group that is off by `pattern`: sizes, then signs.
-    fn steps(
+    /// Adds to what was expected by how much it is off, by `pattern`: sizes, then signs. Answers the sum of sizes.
+    #[inline]
+    fn steps<C: Coder>(
         &mut self,
-        coder: &mut impl Coder,
+        coder: &mut C,
         pattern: usize,
-        expected: Quantised,
+        expected: &mut Quantised,
         error: usize,
         value: Option<&Quantised>,
-        precision: &Precision,
-    ) -> Result<(Quantised, u32), WireError> {
-        let context = expected.group as usize * FAR_ERRORS + error.min(FAR_ERRORS - 1);
+    ) -> Result<u32, WireError> {
+        let kind = expected.group as usize;
+        require(pattern < PATTERNS_OF[kind], "first symbol", "a pattern of the group's components")?;
+        let context = kind * FAR_ERRORS + error.min(FAR_ERRORS - 1);
         let residual = value.map_or([0; 3], |value| [0, 1, 2].map(|i| value.steps[i] - expected.steps[i]));
-        let mut sizes = [pattern % 3, pattern / 3 % 3, pattern / 9].map(|class| class as u32);
-        let (mut signs, mut count) = (0, 0);
+        let mut sizes = CLASSES[pattern];
         for (size, residual) in sizes.iter_mut().zip(residual) {
             if *size > 1 {
                 *size = self.size(coder, context, residual.unsigned_abs());
             }
-            if *size > 0 {
-                signs |= u32::from(residual < 0) << count;
-                count += 1;
-            }
         }
-        signs = coder.raw(signs, count);
-        let mut steps = expected.steps;
-        for (step, &size) in steps.iter_mut().zip(&sizes).filter(|(_, size)| **size > 0) {
-            *step = step.saturating_add(if signs & 1 == 1 { -(size as i32) } else { size as i32 });
-            signs >>= 1;
+        let off = sizes.map(|size| u32::from(size > 0));
+        let [a, b, c] = [0, 1, 2].map(|i| u32::from(residual[i] < 0) & off[i]);
+        let mut signs = coder.few(a | (b | c << off[1]) << off[0], off[0] + off[1] + off[2]);
+        for (i, step) in expected.steps.iter_mut().enumerate() {
+            let size = sizes[i] as i32;
+            *step += if signs & off[i] == 1 { -size } else { size };
+            signs >>= off[i];
         }
-        let value = Quantised { steps, ..expected };
-        value.check(precision)?;
-        Ok((value, sizes.iter().sum()))
+        Ok(sizes.iter().sum())
     }
 
     /// Codes a size of at least 2.

@@ -167,7 +167,7 @@ fn encode_against(
             &empty
         }
     };
-    let mut next = successor(base, tick);
+    let mut next = Frame { tick, ..base.clone() };
     let mut coder = ans::Encoder::new(choices);
     let mut spent = Spent::default();
     let walk = Walk { coder: &mut coder, base, partial, source: Some(source), spent: &mut spent };
@@ -215,7 +215,7 @@ impl Decoder {
                 &empty
             }
         };
-        let mut next = successor(base, tick);
+        let mut next = Frame { tick, ..base.clone() };
         let mut coder = ans::Decoder::new(header.bytes);
         let partial = flags & PARTIAL != 0;
         let spent = &mut Spent::default();
@@ -271,19 +271,6 @@ impl Decoder {
         let over = self.had.len().saturating_sub(HISTORY).min(at);
         self.had.drain(..over);
         kept
-    }
-}
-
-/// A frame for `tick` that goes on from `base`, its bodies still to come.
-fn successor(base: &Frame, tick: u64) -> Frame {
-    let (bodies, groups) = (base.bodies.len(), base.groups.len());
-    Frame {
-        tick,
-        precision: base.precision,
-        bodies: Vec::with_capacity(bodies),
-        ticks: Vec::with_capacity(bodies),
-        groups: Vec::with_capacity(groups),
-        models: base.models.clone(),
     }
 }
 

@@ -4,7 +4,7 @@ use super::ans::Coder;
 use super::budget::Spent;
 use super::frame::{BODIES_MAX, BODY_GROUPS_MAX, Body, Frame, GROUPS_MAX, State};
 use super::predict::GroupState;
-use super::quantise::{Group, Precision, Quantised};
+use super::quantise::{Fineness, Group, Quantised};
 use super::residual::Models;
 use crate::{WireError, codec::require};
 
@@ -55,37 +55,49 @@ pub struct Walk<'a, C> {
     pub spent: &'a mut Spent,
 }
 
-impl<C: Coder> Walk<'_, C> {
-    /// Codes the snapshot of `tick` into `next`, a copy of the base without bodies.
+impl<'a, C: Coder> Walk<'a, C> {
+    /// Codes a snapshot into `next`, a copy of the base but for its tick.
     ///
     /// # Errors
     /// [`WireError`] for data that no encoder writes.
     pub fn run(mut self, next: &mut Frame) -> Result<(), WireError> {
-        let changed = self.source.is_some_and(|source| is_changed(self.base, &source));
-        let (mut removed, mut added) = (Vec::new(), Vec::new());
+        let changed = self.source().is_some_and(|source| is_changed(self.base, &source));
         if next.models.flag(self.coder, flag::CHANGED, changed) {
-            removed = self.removals(&mut next.models)?;
-            added = self.additions(&mut next.models, removed.len())?;
+            let removed = self.removals(&mut next.models)?;
+            let added = self.additions(&mut next.models, removed.len())?;
+            self.replace(next, removed, added)?;
         }
+        self.updates(next)
+    }
+
+    /// What an encoder has to say; a decoder is compiled without it.
+    #[inline]
+    fn source(&self) -> Option<Source<'a>> {
+        self.source.filter(|_| C::WRITES)
+    }
+
+    /// Takes bodies out of `next`, and puts others in.
+    fn replace(&mut self, next: &mut Frame, removed: Vec<usize>, added: Vec<Added>) -> Result<(), WireError> {
         let (mut removed, mut added) = (removed.into_iter().peekable(), added.into_iter().peekable());
-        let (mut neighbour, mut cursor) = (0, 0);
-        for index in 0..self.base.bodies.len() {
+        next.clear();
+        for (index, body) in self.base.bodies.iter().enumerate() {
             if removed.next_if_eq(&index).is_some() {
                 continue;
             }
-            let id = self.base.bodies[index].id;
-            while let Some(body) = added.next_if(|body| body.id < id) {
-                self.first(next, body)?;
+            while let Some(new) = added.next_if(|new| new.id < body.id) {
+                self.first(next, new)?;
             }
-            require(added.peek().is_none_or(|body| body.id != id), "added body", "not there yet")?;
-            self.body(next, index, &mut neighbour, &mut cursor)?;
+            require(added.peek().is_none_or(|new| new.id != body.id), "added body", "not there yet")?;
+            next.bodies.push(Body { start: next.groups.len() as u32, ..*body });
+            next.ticks.push(self.base.ticks[index]);
+            next.groups.extend_from_slice(self.base.groups(body));
         }
-        added.try_for_each(|body| self.first(next, body))
+        added.try_for_each(|new| self.first(next, new))
     }
 
     /// Indices in the base of those that are gone.
     fn removals(&mut self, models: &mut Models) -> Result<Vec<usize>, WireError> {
-        let gone: Vec<_> = match self.source {
+        let gone: Vec<_> = match self.source() {
             Some(Source { state, .. }) => {
                 (0..self.base.bodies.len()).filter(|&i| !is_in(&self.base.bodies[i], state)).collect()
             }
@@ -107,14 +119,14 @@ impl<C: Coder> Walk<'_, C> {
 
     /// Those that are new, without groups' values.
     fn additions(&mut self, models: &mut Models, removed: usize) -> Result<Vec<Added>, WireError> {
-        let new: Vec<_> = self.source.map(|source| fresh(self.base, &source).collect()).unwrap_or_default();
+        let new: Vec<_> = self.source().map(|source| fresh(self.base, &source).collect()).unwrap_or_default();
         let count = models.number(self.coder, number::ADDED, new.len() as u32) as usize;
         require(self.base.bodies.len() - removed + count <= BODIES_MAX, "bodies", "at most 16384")?;
         let mut added: Vec<Added> = Vec::new();
         let mut after = 0u32;
         for k in 0..count {
             let (body, layout) = new.get(k).map_or((None, Vec::new()), |&body| {
-                let groups = self.source.map(|s| s.state.groups(body)).unwrap_or_default();
+                let groups = self.source().map(|s| s.state.groups(body)).unwrap_or_default();
                 (Some(body), groups.iter().map(|g| g.group).collect())
             });
             let gap = body.map_or(0, |body| body.id - after);
@@ -156,15 +168,15 @@ impl<C: Coder> Walk<'_, C> {
     /// A body that the receiver does not have yet.
     fn first(&mut self, next: &mut Frame, added: Added) -> Result<(), WireError> {
         require(next.groups.len() + added.layout.len() <= GROUPS_MAX, "groups", "at most 65536")?;
-        let source = self.source.and_then(|s| Some(s.state.groups(s.state.find(added.id)?)));
-        let (start, written) = (next.groups.len(), self.coder.written());
+        let source = self.source().and_then(|s| Some(s.state.groups(s.state.find(added.id)?)));
+        let (start, written, fineness) = (next.groups.len(), self.coder.written(), next.precision.fineness());
         // Points are likely to be near the last point of this body, the first one near the first of the body before.
         let mut before = next.bodies.last().map(|body| next.groups[body.start as usize].value);
         for (i, &group) in added.layout.iter().enumerate() {
             let value = source.map(|groups| groups[i]);
             let near = if group == Group::Point { before } else { None };
             let near = near.filter(|near| near.group == Group::Point).map_or([0; 3], |near| near.steps);
-            let value = first_value(self.coder, &mut next.models, group, near, value, &next.precision)?;
+            let value = first_value(self.coder, &mut next.models, group, near, value, &fineness)?;
             next.groups.push(GroupState::first(value));
             before = if group == Group::Point { Some(value) } else { before };
         }
@@ -175,53 +187,66 @@ impl<C: Coder> Walk<'_, C> {
         Ok(())
     }
 
-    /// A body of the base; `cursor` is where the source has the one before.
+    /// All bodies of the base that stay; those that are of this tick are new.
+    fn updates(&mut self, next: &mut Frame) -> Result<(), WireError> {
+        let Frame { tick, precision, bodies, ticks, groups, models } = next;
+        let fineness = precision.fineness();
+        let (mut neighbour, mut cursor) = (0, 0);
+        for (body, told) in bodies.iter().zip(ticks).filter(|(_, told)| **told != *tick) {
+            let source = self.source_of(body.id, &mut cursor);
+            if self.partial && !models.flag(self.coder, flag::SENT, source.is_some_and(|(sent, _)| sent)) {
+                continue;
+            }
+            let ahead = (*tick - *told) as i64;
+            *told = *tick;
+            let states = &mut groups[body.start as usize..][..body.groups.into()];
+            let now = source.map(|(_, now)| now);
+            neighbour = self.body(models, states, ahead, neighbour, now, &fineness)?;
+        }
+        Ok(())
+    }
+
+    /// What an encoder has to say of a body of the base, and whether it is to say it; `cursor` is where it has the one
+    /// before.
+    #[inline]
+    fn source_of(&self, id: u32, cursor: &mut usize) -> Option<(bool, &'a [Quantised])> {
+        let source = self.source()?;
+        let bodies = source.state.bodies();
+        *cursor += bodies[*cursor..].iter().take_while(|known| known.id < id).count();
+        let found = bodies.get(*cursor).filter(|found| found.id == id)?;
+        Some((source.carries(*cursor), source.state.groups(found)))
+    }
+
+    /// A body; `neighbour` is by how much the one before was off. Answers by how much this one is.
+    #[inline]
     fn body(
         &mut self,
-        next: &mut Frame,
-        index: usize,
-        neighbour: &mut u32,
-        cursor: &mut usize,
-    ) -> Result<(), WireError> {
-        let body = self.base.bodies[index];
-        let old = &self.base.groups[body.start as usize..][..body.groups.into()];
-        let source = self.source.and_then(|s| {
-            *cursor += s.state.bodies()[*cursor..].iter().take_while(|known| known.id < body.id).count();
-            let found = s.state.bodies().get(*cursor).filter(|found| found.id == body.id)?;
-            Some((s.carries(*cursor), s.state.groups(found)))
-        });
-        let sent = !self.partial || next.models.flag(self.coder, flag::SENT, source.is_some_and(|(sent, _)| sent));
-        let start = next.groups.len() as u32;
-        next.bodies.push(Body { start, ..body });
-        if !sent {
-            next.ticks.push(self.base.ticks[index]);
-            next.groups.extend_from_slice(old);
-            return Ok(());
-        }
-        next.ticks.push(next.tick);
-        if old.iter().all(GroupState::is_calm) {
-            let stirs = source.is_some_and(|(_, now)| old.iter().zip(now).any(|(base, now)| base.value != *now));
-            if !next.models.stirs(self.coder, *neighbour, stirs) {
-                next.groups.extend_from_slice(old);
-                *neighbour = 0;
-                return Ok(());
+        models: &mut Models,
+        states: &mut [GroupState],
+        ahead: i64,
+        neighbour: u32,
+        now: Option<&[Quantised]>,
+        fineness: &Fineness,
+    ) -> Result<u32, WireError> {
+        if states.iter().all(GroupState::is_calm) {
+            let stirs = now.is_some_and(|now| states.iter().zip(now).any(|(state, now)| state.value != *now));
+            if !models.stirs(self.coder, neighbour, stirs) {
+                return Ok(0);
             }
         }
-        let ahead = next.tick.saturating_sub(self.base.ticks[index]) as i64;
-        let mut sibling = None;
         let (mut moved, mut changed, written) = (0, 0, self.coder.written());
-        for (i, base) in old.iter().enumerate() {
-            let prediction = base.predict(ahead);
-            let value = source.map(|(_, groups)| &groups[i]);
-            let (value, size) = next.models.group(self.coder, base, &prediction, sibling, value, &next.precision)?;
-            next.groups.push(prediction.update(base, value, &next.precision));
+        let mut sibling = None;
+        for (i, state) in states.iter_mut().enumerate() {
+            let (old, now) = (state.value, now.map(|now| &now[i]));
+            let size = models.group(self.coder, state, ahead, sibling, now, fineness)?;
             sibling = Some(size);
             moved += size;
-            changed += usize::from(value != base.value);
+            changed += usize::from(C::WRITES && state.value != old);
         }
-        self.spent.updates.add(changed, self.coder.written() - written);
-        *neighbour = moved;
-        Ok(())
+        if C::WRITES {
+            self.spent.updates.add(changed, self.coder.written() - written);
+        }
+        Ok(moved)
     }
 }
 
@@ -261,7 +286,7 @@ fn first_value(
     group: Group,
     near: [i32; 3],
     value: Option<Quantised>,
-    precision: &Precision,
+    fineness: &Fineness,
 ) -> Result<Quantised, WireError> {
     let value = value.unwrap_or(Quantised { group, largest: 0, steps: near });
     let mut read = Quantised { group, largest: 0, steps: [0; 3] };
@@ -272,6 +297,6 @@ fn first_value(
         let step = models.signed(coder, number::FIRST + group as usize, value.steps[i] - near);
         read.steps[i] = near.saturating_add(step);
     }
-    read.check(precision)?;
+    read.check(fineness)?;
     Ok(read)
 }
