@@ -5,14 +5,14 @@
 //! one tells of it, carried on along Q', and does not flicker; else it is no more.
 
 use std::{
-    collections::{BTreeMap, btree_map::Entry},
-    sync::Arc,
+    collections::{BTreeMap, VecDeque, btree_map::Entry},
+    sync::{Arc, Weak},
 };
 
 use crate::interpolation::rates_between;
 
 use pita_protocol::{
-    dof::{BODIES_MAX, Frame, Slice},
+    dof::{BODIES_MAX, Frame, GROUPS_MAX, Slice},
     message::{CellId, Departure},
 };
 
@@ -20,6 +20,12 @@ use pita_protocol::{
 const AWAITED_TICKS: u64 = 32;
 /// Q' is what two states differ by that are no more ticks apart; else it is as the stream tracks it.
 const APART_TICKS: u64 = 16;
+
+/// Groups of frames that bodies may be of, 70 MB at most, and how many such frames: a full cell carries some of its bodies
+/// at a time, so that each may have its newest state from another one. Of the largest world these are sixteen frames, of
+/// one that fills a budget some seconds.
+const HELD_GROUPS_MAX: usize = 16 * GROUPS_MAX;
+const HELD_FRAMES_MAX: usize = 2048;
 
 /// Where a state comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -48,6 +54,9 @@ struct Known {
 pub struct Bodies {
     bodies: BTreeMap<u32, Known>,
     newest: BTreeMap<Source, Arc<Frame>>,
+    /// Frames that were taken, oldest first, as far as somebody has them still, each with its groups.
+    held: VecDeque<(Source, Weak<Frame>, usize)>,
+    held_groups: usize,
 }
 
 /// All bodies at a moment, in order of id, each by the place of its frame.
@@ -92,6 +101,21 @@ impl Gathered {
     }
 }
 
+impl Known {
+    /// Is of `old` no more, but of `newest`; answers whether that has it.
+    fn let_go(&mut self, id: u32, old: &Arc<Frame>, newest: Option<&Arc<Frame>>) -> bool {
+        self.before.take_if(|(frame, _)| Arc::ptr_eq(frame, old));
+        if !Arc::ptr_eq(&self.frame, old) {
+            return true;
+        }
+        let Some((newest, tick)) = newest.and_then(|newest| Some((newest, newest.tick_of_body(id)?))) else {
+            return false;
+        };
+        (self.frame, self.tick, self.before) = (Arc::clone(newest), tick, None);
+        true
+    }
+}
+
 impl Bodies {
     /// Takes what `source` says, if it is newer than what it said before. `departures` tell who went over to which cell,
     /// and `is_taken` which cells tell of theirs.
@@ -109,11 +133,13 @@ impl Bodies {
         for (body, tick) in frame.bodies() {
             self.take_body(source, frame, body.id, tick);
         }
+        self.hold(source, frame);
         let Some(before) = before else { return };
+        let to: BTreeMap<u32, CellId> =
+            departures.iter().flat_map(|departure| departure.bodies.iter().map(|&id| (id, departure.to))).collect();
         for (body, _) in before.bodies().filter(|(body, _)| frame.find(body.id).is_none()) {
-            let to =
-                departures.iter().find(|departure| departure.bodies.contains(&body.id)).map(|departure| departure.to);
-            self.lack_body(source, body.id, to.filter(|to| is_taken(*to)).map(|_| frame.tick()));
+            let is_awaited = to.get(&body.id).is_some_and(|to| is_taken(*to));
+            self.lack_body(source, body.id, is_awaited.then_some(frame.tick()));
         }
     }
 
@@ -152,6 +178,33 @@ impl Bodies {
                     };
                     entry.insert(known);
                 }
+            }
+        }
+    }
+
+    /// Bounds what the frames take that bodies are of: who is of one that is too old goes over to its source's newest, which
+    /// has the state of the last keyframe.
+    fn hold(&mut self, source: Source, frame: &Arc<Frame>) {
+        self.held.push_back((source, Arc::downgrade(frame), frame.group_count()));
+        self.held_groups += frame.group_count();
+        let mut spared = 0;
+        while self.held.len() > HELD_FRAMES_MAX || self.held_groups > HELD_GROUPS_MAX {
+            let Some((source, old, groups)) = self.held.pop_front() else { return };
+            let is_newest =
+                self.newest.get(&source).is_some_and(|newest| std::ptr::eq(Arc::as_ptr(newest), old.as_ptr()));
+            if is_newest && spared < self.newest.len() {
+                // A quiet cell's; all others go before it.
+                spared += 1;
+                self.held.push_back((source, old, groups));
+                continue;
+            }
+            self.held_groups -= groups;
+            if is_newest {
+                self.newest.remove(&source);
+            }
+            if let Some(old) = old.upgrade() {
+                let newest = self.newest.get(&source);
+                self.bodies.retain(|id, known| known.let_go(*id, &old, newest));
             }
         }
     }
@@ -243,6 +296,30 @@ mod tests {
         assert!((speed(&mut bodies, 8) - 30.0).abs() < 0.1);
         take(&mut bodies, Source::Cell(B), 9 + APART_TICKS, &[3], &[]);
         assert_eq!(speed(&mut bodies, 9 + APART_TICKS), 0.0, "too long ago");
+    }
+
+    /// A full cell of many bodies that says of one at a time something new.
+    #[test]
+    fn the_frames_that_bodies_are_of_are_bounded() {
+        let (mut bodies, mut encoder, mut decoder) = (Bodies::default(), Encoder::default(), Decoder::default());
+        let count = 20_000u64.min(BODIES_MAX as u64);
+        let mut state = State::new(Precision::default()).unwrap();
+        let layout = [Group::Scalar; 4];
+        let mut chosen = vec![true; count as usize];
+        for tick in 1..60u64 {
+            state.clear();
+            (0..count as u32).for_each(|id| state.push(id, kind::OWN, None, &layout, &[tick as f64; 4]).unwrap());
+            let dof = encoder.encode(tick, &state, &chosen);
+            encoder.acknowledge(tick, 0);
+            chosen.fill(false);
+            chosen[tick as usize] = true;
+            bodies.take(Source::Cell(A), &decoder.decode(tick, &dof).unwrap(), &[], |_| true);
+            let frames = bodies.gather(tick).frames;
+            let groups: usize = frames.iter().map(|frame| frame.group_count()).sum();
+            assert!(groups <= HELD_GROUPS_MAX, "{groups} groups of {} frames at {tick}", frames.len());
+        }
+        // Nobody is lost by that.
+        assert_eq!(bodies.gather(60).bodies.len() as u64, count);
     }
 
     #[test]

@@ -1,14 +1,18 @@
 //! The cells that a session may take: what arrives of them, and what is missing to read it.
 //!
-//! Pure, and bounded by what a session may take.
+//! Pure, and bounded by what a session may take and what a world may hold.
 
 use std::{collections::BTreeMap, sync::Arc};
 
 use pita_protocol::{
     WireError, decode,
-    dof::{CellDecoder, Frame},
+    dof::{CellDecoder, Frame, GROUPS_MAX},
     message::{CellGrant, CellId, CellSnapshot, Departure, Keyframes, KeyframesWanted},
 };
+
+/// Groups that the keyframes of all cells may have: a world's as often as each reader keeps them, and as many again for
+/// bodies that two cells know. Beyond that no server is what it says it is.
+const GROUPS_KEPT_MAX: usize = 2 * 8 * GROUPS_MAX;
 
 /// What arrived.
 #[derive(Debug)]
@@ -93,17 +97,19 @@ impl CellInbox {
         lost.map(wanted).collect()
     }
 
-    /// Takes a message on a cell's key.
+    /// Takes a message of a cell, of no later tick than `latest`.
     ///
     /// # Errors
     /// [`WireError`] for what no server sends.
-    pub fn take(&mut self, bytes: &[u8]) -> Result<Taken, WireError> {
+    pub fn take(&mut self, bytes: &[u8], latest: u64) -> Result<Taken, WireError> {
         let CellSnapshot { cell, tick, keyframe_age, departures, dof } = decode(bytes)?;
         let Some(reading) = self.cells.get_mut(&cell) else { return Ok(Taken::Foreign) };
+        check_tick(tick, latest)?;
         match reading.decode(tick, &dof, keyframe_age == 0) {
             Ok(frame) => {
                 // Snapshots to come will be coded against it.
                 reading.is_lost = !reading.decoder.has(tick.saturating_sub(keyframe_age.into()));
+                self.check_room(cell)?;
                 Ok(Taken::Frame(cell, frame, departures))
             }
             Err(WireError::NoBaseline) => Ok(Taken::Unreadable),
@@ -111,11 +117,11 @@ impl CellInbox {
         }
     }
 
-    /// Takes an answer to what was asked for.
+    /// Takes an answer to what was asked for, of no later tick than `latest`.
     ///
     /// # Errors
     /// [`WireError`] for what no server sends.
-    pub fn take_keyframes(&mut self, answer: &Keyframes) -> Result<Fetched, WireError> {
+    pub fn take_keyframes(&mut self, answer: &Keyframes, latest: u64) -> Result<Fetched, WireError> {
         let mut fetched = Fetched::default();
         for of_cell in &answer.cells {
             let Some(reading) = self.cells.get_mut(&of_cell.cell) else { continue };
@@ -123,13 +129,31 @@ impl CellInbox {
             reading.is_lost = false;
             let mut newest = None;
             for keyframe in &of_cell.keyframes {
+                check_tick(keyframe.tick, latest)?;
                 newest = Some(reading.decode(keyframe.tick, &keyframe.dof, true)?);
                 fetched.keyframes += 1;
             }
             fetched.frames.extend(newest.map(|frame| (of_cell.cell, frame)));
+            self.check_room(of_cell.cell)?;
         }
         Ok(fetched)
     }
+
+    /// Forgets what it has of `cell` where all cells together are more than a world holds.
+    fn check_room(&mut self, cell: CellId) -> Result<(), WireError> {
+        let groups = self.cells.values().map(|reading| reading.decoder.group_count()).sum::<usize>();
+        if groups <= GROUPS_KEPT_MAX {
+            return Ok(());
+        }
+        self.cells.insert(cell, Reading { decoder: CellDecoder::default(), is_lost: true });
+        Err(WireError::Content { field: "groups of all cells", allowed: "those of one world" })
+    }
+}
+
+/// One tick that is far too late would make everything after it look old.
+fn check_tick(tick: u64, latest: u64) -> Result<(), WireError> {
+    let wrong = WireError::Content { field: "tick", allowed: "not ahead of the clock" };
+    if tick <= latest { Ok(()) } else { Err(wrong) }
 }
 
 impl Reading {
@@ -147,8 +171,9 @@ impl Reading {
 mod tests {
     use super::*;
     use pita_protocol::{
-        dof::{Cadence, CellEncoder, Group, Precision, State, kind},
+        dof::{BODIES_MAX, Cadence, CellEncoder, Due, Group, Precision, State, kind},
         encode,
+        message::{CellKeyframes, Keyframe},
     };
     use proptest::prelude::*;
 
@@ -176,7 +201,7 @@ mod tests {
     fn a_newcomer_asks_and_reads_on_and_asks_again_where_a_keyframe_is_lost() {
         let (mut encoder, mut inbox) = (CellEncoder::new(Cadence::default()), CellInbox::default());
         (1..=20).for_each(|tick| drop(next(&mut encoder, tick)));
-        assert!(matches!(inbox.take(&next(&mut encoder, 21)), Ok(Taken::Foreign)));
+        assert!(matches!(inbox.take(&next(&mut encoder, 21), 99), Ok(Taken::Foreign)));
         assert_eq!(inbox.grant(21, granted(&[CELL])), Some(vec![]));
         assert_eq!(inbox.grant(21, granted(&[])), None, "as old as the last");
         let answer = |encoder: &CellEncoder, wanted: &[KeyframesWanted]| {
@@ -184,23 +209,54 @@ mod tests {
             wanted.iter().for_each(|&wanted| answer.push(wanted, encoder.epoch()));
             answer
         };
-        assert!(matches!(inbox.take(&next(&mut encoder, 22)), Ok(Taken::Unreadable)));
+        assert!(matches!(inbox.take(&next(&mut encoder, 22), 99), Ok(Taken::Unreadable)));
         assert_eq!(inbox.wanted(), [KeyframesWanted { cell: CELL, have: 0 }]);
-        let frames = inbox.take_keyframes(&answer(&encoder, &inbox.wanted())).unwrap().frames;
+        let frames = inbox.take_keyframes(&answer(&encoder, &inbox.wanted()), 99).unwrap().frames;
         assert_eq!((frames[0].0, frames[0].1.tick()), (CELL, 17));
         assert!(inbox.wanted().is_empty());
-        assert!(matches!(inbox.take(&next(&mut encoder, 23)), Ok(Taken::Frame(..))));
+        assert!(matches!(inbox.take(&next(&mut encoder, 23), 99), Ok(Taken::Frame(..))));
         assert!(inbox.wanted().is_empty());
         // That of tick 25 does not arrive. What comes soon after can be read without it, and tells of it.
         (24..=25).for_each(|tick| drop(next(&mut encoder, tick)));
-        assert!(matches!(inbox.take(&next(&mut encoder, 26)), Ok(Taken::Frame(..))));
+        assert!(matches!(inbox.take(&next(&mut encoder, 26), 99), Ok(Taken::Frame(..))));
         assert_eq!(inbox.wanted(), [KeyframesWanted { cell: CELL, have: 17 }]);
         (27..=29).for_each(|tick| drop(next(&mut encoder, tick)));
-        assert!(matches!(inbox.take(&next(&mut encoder, 30)), Ok(Taken::Unreadable)));
-        assert_eq!(inbox.take_keyframes(&answer(&encoder, &inbox.wanted())).unwrap().keyframes, 1);
-        assert!(matches!(inbox.take(&next(&mut encoder, 31)), Ok(Taken::Frame(..))));
+        assert!(matches!(inbox.take(&next(&mut encoder, 30), 99), Ok(Taken::Unreadable)));
+        assert_eq!(inbox.take_keyframes(&answer(&encoder, &inbox.wanted()), 99).unwrap().keyframes, 1);
+        assert!(matches!(inbox.take(&next(&mut encoder, 31), 99), Ok(Taken::Frame(..))));
         assert_eq!(inbox.grant(32, Vec::new()), Some(vec![CELL]));
-        assert!(matches!(inbox.take(&next(&mut encoder, 32)), Ok(Taken::Foreign)));
+        assert!(matches!(inbox.take(&next(&mut encoder, 32), 99), Ok(Taken::Foreign)));
+    }
+
+    #[test]
+    fn a_tick_that_cannot_be_hides_nothing() {
+        let (mut encoder, mut inbox) = (CellEncoder::new(Cadence::default()), CellInbox::default());
+        inbox.grant(1, granted(&[CELL]));
+        assert!(matches!(inbox.take(&next(&mut encoder, 10), 9), Err(WireError::Content { field: "tick", .. })));
+        let keyframes = Keyframe { tick: 10, dof: encoder.epoch()[0].dof.clone() };
+        let answer = Keyframes { cells: vec![CellKeyframes { cell: CELL, keyframes: vec![keyframes] }] };
+        assert!(inbox.take_keyframes(&answer, 9).is_err());
+        assert_eq!(inbox.take_keyframes(&answer, 10).unwrap().keyframes, 1);
+    }
+
+    #[test]
+    fn cells_that_hold_more_than_a_world_are_refused() {
+        let mut inbox = CellInbox::default();
+        let cells: Vec<CellId> = (0..24).map(|x| CellId { x, z: 0 }).collect();
+        inbox.grant(1, granted(&cells));
+        let mut state = State::new(Precision::default()).unwrap();
+        let layout = [Group::Scalar; 4];
+        (0..BODIES_MAX as u32).for_each(|id| state.push(id, kind::OWN, None, &layout, &[0.0; 4]).unwrap());
+        let dof = CellEncoder::new(Cadence::default()).encode(5, &state, Due::Epoch, &[]).dof;
+        let mut refused = 0;
+        for cell in cells {
+            let departures = Vec::new();
+            let taken =
+                inbox.take(&encode(&CellSnapshot { cell, tick: 5, keyframe_age: 0, departures, dof: dof.clone() }), 9);
+            refused += usize::from(taken.is_err());
+        }
+        let groups: usize = inbox.cells.values().map(|reading| reading.decoder.group_count()).sum();
+        assert_eq!((groups, refused), (GROUPS_KEPT_MAX, 24 - 16));
     }
 
     proptest! {
@@ -209,8 +265,9 @@ mod tests {
             let mut inbox = CellInbox::default();
             inbox.grant(1, granted(&[CELL]));
             let head = [pita_protocol::PROTOCOL_VERSION as u8, <CellSnapshot as pita_protocol::Message>::KIND];
-            let _ = inbox.take(&[&head[..], &body].concat());
-            let _ = inbox.take(&encode(&CellSnapshot { cell: CELL, tick, keyframe_age, departures: Vec::new(), dof }));
+            let _ = inbox.take(&[&head[..], &body].concat(), u64::MAX);
+            let message = CellSnapshot { cell: CELL, tick, keyframe_age, departures: Vec::new(), dof };
+            let _ = inbox.take(&encode(&message), u64::MAX);
         }
     }
 }

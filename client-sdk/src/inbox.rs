@@ -95,7 +95,7 @@ impl Inbox {
                 self.statistics.snapshots_foreign += 1;
                 return None;
             }
-            Ok(head) if self.is_plausible(head.tick, now) => head,
+            Ok(head) if head.tick <= self.latest(now) => head,
             _ => {
                 self.statistics.malformed += 1;
                 return None;
@@ -139,9 +139,9 @@ impl Inbox {
 
     /// Takes a message of a cell. What comes later than the session's own snapshot of that tick is added to it. Answers
     /// whether a keyframe is missing.
-    pub fn take_cell(&mut self, bytes: &[u8]) -> bool {
+    pub fn take_cell(&mut self, bytes: &[u8], now: Instant) -> bool {
         self.statistics.received_bytes += bytes.len() as u64;
-        match self.cells.take(bytes) {
+        match self.cells.take(bytes, self.latest(now)) {
             Ok(Taken::Frame(cell, frame, departures)) => {
                 self.statistics.cells_received += 1;
                 self.bodies.take(Source::Cell(cell), &frame, &departures, |to| self.cells.is_taken(to));
@@ -156,8 +156,8 @@ impl Inbox {
     }
 
     /// Takes keyframes that were asked for.
-    pub fn take_keyframes(&mut self, answer: &Keyframes) {
-        match self.cells.take_keyframes(answer) {
+    pub fn take_keyframes(&mut self, answer: &Keyframes, now: Instant) {
+        match self.cells.take_keyframes(answer, self.latest(now)) {
             Ok(fetched) => {
                 self.statistics.keyframes_fetched += fetched.keyframes as u64;
                 for (cell, frame) in fetched.frames {
@@ -276,11 +276,12 @@ impl Inbox {
         }
     }
 
-    fn is_plausible(&self, tick: u64, now: Instant) -> bool {
+    /// The latest tick that the server can have reached.
+    fn latest(&self, now: Instant) -> u64 {
         let (newest, since) = self.newest;
         let elapsed_s = now.saturating_duration_since(since).as_secs_f64();
         let allowed_s = 2.0 * elapsed_s + AHEAD_MAX_S;
-        tick.saturating_sub(newest) as f64 * self.clock.period_s() <= allowed_s
+        newest.saturating_add((allowed_s / self.clock.period_s()) as u64)
     }
 
     /// Keeps `snapshot` for interpolation, instead of what there was of its tick.

@@ -1,6 +1,10 @@
 //! The task that follows which cells a session may take: subscribes to their keys, and asks for keyframes that are missing.
 
-use std::{collections::BTreeMap, sync::Arc, time::Duration};
+use std::{
+    collections::BTreeMap,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use pita_protocol::{
     Keys, encode,
@@ -47,7 +51,7 @@ impl Looking {
     ) -> Self {
         let sink = Arc::clone(&shared);
         let link = conditioner.map(|settings| {
-            let take = move |bytes: Vec<u8>| sink.take_cell(&bytes);
+            let take = move |bytes: Vec<u8>| sink.take_cell(&bytes, Instant::now());
             Arc::new(Link::new(settings.down, Delivery::Datagrams, settings.seed ^ SEED, take))
         });
         let way = conditioner.map_or(Duration::ZERO, |settings| settings.up.latency + settings.down.latency);
@@ -96,7 +100,7 @@ impl Looking {
             }
             None => {
                 let shared = Arc::clone(&self.shared);
-                subscriber.callback(move |sample| shared.take_cell(&sample.payload().to_bytes())).await
+                subscriber.callback(move |sample| shared.take_cell(&sample.payload().to_bytes(), Instant::now())).await
             }
         }
     }
@@ -106,7 +110,7 @@ impl Looking {
         let request = encode(&KeyframesRequest { cells });
         let asked = transport::ask(&self.zenoh, &self.keys.keyframes(), "keyframes", request, ANSWER_TIMEOUT).await;
         match asked {
-            Ok(Some(answer)) => lock(&self.shared.inbox).take_keyframes(&answer),
+            Ok(Some(answer)) => lock(&self.shared.inbox).take_keyframes(&answer, Instant::now()),
             Ok(None) => {}
             Err(error) => {
                 tracing::debug!("asking for keyframes: {error}");

@@ -70,7 +70,7 @@ impl Shared {
     /// Takes what came on the key of the session's snapshots: cells come along where it asked for that.
     pub fn take_own(&self, bytes: &[u8], now: Instant) {
         match kind_of(bytes) {
-            Some(CellSnapshot::KIND) => self.take_cell(bytes),
+            Some(CellSnapshot::KIND) => self.take_cell(bytes, now),
             _ => self.take_snapshot(bytes, now),
         }
     }
@@ -96,8 +96,8 @@ impl Shared {
         });
     }
 
-    pub fn take_cell(&self, bytes: &[u8]) {
-        if lock(&self.inbox).take_cell(bytes) {
+    pub fn take_cell(&self, bytes: &[u8], now: Instant) {
+        if lock(&self.inbox).take_cell(bytes, now) {
             self.cells_changed.notify_one();
         }
     }

@@ -265,6 +265,11 @@ impl CellDecoder {
         self.decoder.remembered()
     }
 
+    /// Groups of all frames that it keeps: what it takes of memory.
+    pub fn group_count(&self) -> usize {
+        self.decoder.group_count()
+    }
+
     /// Whether it has the keyframe of `tick`, or a newer one.
     pub fn has(&self, tick: u64) -> bool {
         self.keyframe().is_some_and(|newest| newest >= tick)

@@ -166,6 +166,11 @@ impl Frame {
         self.bodies.binary_search_by_key(&id, |body| body.id).ok().map(|at| &self.bodies[at])
     }
 
+    /// How many groups it has: what it takes of memory.
+    pub fn group_count(&self) -> usize {
+        self.groups.len()
+    }
+
     /// Groups of a body of this frame.
     pub fn groups(&self, body: &Body) -> &[GroupState] {
         &self.groups[body.start as usize..][..body.groups.into()]

@@ -51,6 +51,11 @@ impl Frame {
         Some(Slice { id, kind, tick, groups: groups.collect(), q: single(q), v: single(v) })
     }
 
+    /// Tick of the state of the body with this id.
+    pub fn tick_of_body(&self, id: u32) -> Option<u64> {
+        self.bodies.binary_search_by_key(&id, |body| body.id).ok().map(|at| self.ticks[at])
+    }
+
     /// Tick of the state of a body, or of what it is attached to where that is older.
     fn tick_of(&self, body: &Body, chain: usize) -> Option<u64> {
         let at = self.bodies.binary_search_by_key(&body.id, |body| body.id).ok()?;

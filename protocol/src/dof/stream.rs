@@ -232,6 +232,11 @@ impl Decoder {
         self.had.len()
     }
 
+    /// Groups of all frames that it keeps.
+    pub(super) fn group_count(&self) -> usize {
+        self.had.iter().map(|frame| frame.group_count()).sum()
+    }
+
     /// Forgets the frames of the ticks that `wanted` does not want.
     pub(super) fn retain(&mut self, wanted: impl Fn(u64) -> bool) {
         self.had.retain(|frame| wanted(frame.tick));
