@@ -65,6 +65,8 @@ pub struct Totals {
     pub quarantined: u64,
     /// Ticks of which no frame was left, because the publishing thread had all of them.
     pub frames_missed: u64,
+    /// Events that were left out meanwhile, as far as the world's description does without them.
+    pub events_dropped: u64,
     /// What became of the players' inputs.
     pub inputs: InputCounts,
 }

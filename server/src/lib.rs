@@ -26,6 +26,7 @@ pub mod crowd;
 pub mod daemon;
 pub mod description;
 pub mod drivers;
+pub mod event_backlog;
 pub mod frame;
 pub mod inputs;
 pub mod metrics;

@@ -51,6 +51,8 @@ pub struct Publishing {
     /// Waits for room on the way to the tick thread.
     boarding: VecDeque<Boarding>,
     changes: Vec<Change>,
+    /// Events that are in the description and not out yet, encoded.
+    coming: Vec<Vec<u8>>,
     description: Arc<Description>,
     tick: u64,
     cells: Cells,
@@ -88,6 +90,7 @@ impl Publishing {
             crowd: Crowd::default(),
             boarding: VecDeque::new(),
             changes: Vec::new(),
+            coming: Vec::new(),
             tick: 0,
             has_said_closing: false,
         })
@@ -102,7 +105,8 @@ impl Publishing {
             self.take_frames();
             if self.shared.phase() == Phase::Closing && !self.has_said_closing {
                 self.has_said_closing = true;
-                self.publish_event(Event::Closing { reason: "the server ends".to_owned() });
+                self.add_event(Event::Closing { reason: "the server ends".to_owned() });
+                self.publish_events();
             }
             if self.shared.frames.is_drained() {
                 std::thread::park_timeout(IDLE);
@@ -124,11 +128,12 @@ impl Publishing {
                         self.begin_session(id, role, name);
                     }
                     Change::Resumed { from, to, cells_along } => self.resume_session(from, to, cells_along),
-                    Change::Said { slot, text } => self.publish_event(Event::Said { slot, text }),
+                    Change::Said { slot, text } => self.add_event(Event::Said { slot, text }),
                     Change::Ended { id, role, reason } => self.end_session(id, role, reason),
                 }
             }
             self.changes = changes;
+            self.publish_events();
         }
         while let Some(boarding) = self.boarding.pop_front() {
             if let Err(full) = self.shared.boarding.push(boarding) {
@@ -161,7 +166,7 @@ impl Publishing {
         match role {
             Role::Player => self.board(Boarding::Enter { id, name }),
             Role::Spectator => {
-                self.publish_event(Event::Joined { slot: id.slot, name });
+                self.add_event(Event::Joined { slot: id.slot, name });
                 self.admit(id);
             }
         }
@@ -195,7 +200,7 @@ impl Publishing {
             // The arena never had it.
             (Role::Player, EndReason::NoPlace) => {}
             (Role::Player, _) => self.board(Boarding::Leave { slot, reason: text }),
-            (Role::Spectator, _) => self.publish_event(Event::Left { slot, reason: text }),
+            (Role::Spectator, _) => self.add_event(Event::Left { slot, reason: text }),
         }
     }
 
@@ -220,6 +225,7 @@ impl Publishing {
             for event in frame.events.drain(..) {
                 self.take_arena_event(event);
             }
+            self.publish_events();
             if self.shared.frames.is_drained() {
                 self.publish_snapshots(&mut frame);
             } else {
@@ -232,21 +238,21 @@ impl Publishing {
 
     fn take_arena_event(&mut self, event: ArenaEvent) {
         match event {
-            ArenaEvent::ActorAdded(actor) => self.publish_event(Event::ActorAdded(description::bounded_actor(&actor))),
-            ArenaEvent::ActorRemoved(id) => self.publish_event(Event::ActorRemoved { id }),
-            ArenaEvent::Effect(effect) => self.publish_event(Event::Effect(description::effect(&effect))),
-            ArenaEvent::KnockedOut { actor, by } => self.publish_event(Event::KnockedOut { actor, by }),
-            ArenaEvent::Scored { actor, points } => self.publish_event(Event::Scored { actor, points }),
-            ArenaEvent::RoundEnded { number, winner } => self.publish_event(Event::RoundEnded { number, winner }),
-            ArenaEvent::RoundBegan { number } => self.publish_event(Event::RoundBegan { number }),
+            ArenaEvent::ActorAdded(actor) => self.add_event(Event::ActorAdded(description::bounded_actor(&actor))),
+            ArenaEvent::ActorRemoved(id) => self.add_event(Event::ActorRemoved { id }),
+            ArenaEvent::Effect(effect) => self.add_event(Event::Effect(description::effect(&effect))),
+            ArenaEvent::KnockedOut { actor, by } => self.add_event(Event::KnockedOut { actor, by }),
+            ArenaEvent::Scored { actor, points } => self.add_event(Event::Scored { actor, points }),
+            ArenaEvent::RoundEnded { number, winner } => self.add_event(Event::RoundEnded { number, winner }),
+            ArenaEvent::RoundBegan { number } => self.add_event(Event::RoundBegan { number }),
             ArenaEvent::Entered { slot, name } => {
-                self.publish_event(Event::Joined { slot, name });
+                self.add_event(Event::Joined { slot, name });
                 if let Some(id) = self.ledger.entered(slot) {
                     self.admit(id);
                 }
             }
             ArenaEvent::Left { slot, reason } => match self.ledger.out(slot) {
-                Out::Left => self.publish_event(Event::Left { slot, reason }),
+                Out::Left => self.add_event(Event::Left { slot, reason }),
                 Out::Refused(id) => {
                     tracing::warn!("slot {slot}: the arena refused the player: {reason}");
                     self.shared.sessions().refused_by_arena(id);
@@ -255,13 +261,24 @@ impl Publishing {
         }
     }
 
-    fn publish_event(&mut self, event: Event) {
+    /// Makes the description contain `event`, which is [published](Self::publish_events) with others: as long as nobody else
+    /// has the description it is not copied.
+    fn add_event(&mut self, event: Event) {
         let sequence = self.description.event_sequence.wrapping_add(1);
         description::apply(Arc::make_mut(&mut self.description), &event, sequence, self.tick);
+        self.coming.push(pita_protocol::encode(&EventMessage { sequence, tick: self.tick, event }));
+    }
+
+    /// Publishes what was added. The description comes first: who asks for it after an event finds the event in it.
+    fn publish_events(&mut self) {
+        if self.coming.is_empty() {
+            return;
+        }
         self.shared.set_description(self.description.clone());
-        let bytes = pita_protocol::encode(&EventMessage { sequence, tick: self.tick, event });
-        self.shared.counters.sent_bytes.add((bytes.len() * self.feeds.len()) as u64);
-        self.events.put(bytes);
+        for bytes in self.coming.drain(..) {
+            self.shared.counters.sent_bytes.add((bytes.len() * self.feeds.len()) as u64);
+            self.events.put(bytes);
+        }
     }
 
     /// The cells once for everybody, and for every session its own actor, coded against what it acknowledged.

@@ -114,6 +114,10 @@ pub fn trouble(earlier: &Troubles, latest: &Troubles, when_behind: WhenBehind) -
     if unpublished > 0 {
         lines.push(format!("behind: {unpublished} ticks were not published, because publishing did not keep up"));
     }
+    let untold = now.events_dropped - before.events_dropped;
+    if untold > 0 {
+        lines.push(format!("behind: {untold} events were not told, because publishing did not keep up"));
+    }
     let dropped = latest.queries_dropped - earlier.queries_dropped;
     if dropped > 0 {
         lines.push(format!("behind: {dropped} queries were not answered, because too many waited"));
@@ -134,11 +138,19 @@ mod tests {
         let ticks = Totals { overruns: 5, given_up_ns: 7_000_000, ..Totals::default() };
         let before = Troubles { totals: ticks, queries_dropped: 3, ..Troubles::default() };
         assert_eq!(trouble(&before, &before, WhenBehind::SlowDown), Vec::<String>::new());
-        let totals = Totals { overruns: 7, given_up_ns: 90_000_000, frames_missed: 4, quarantined: 1, ..ticks };
+        let totals = Totals {
+            overruns: 7,
+            given_up_ns: 90_000_000,
+            frames_missed: 4,
+            events_dropped: 9,
+            quarantined: 1,
+            ..ticks
+        };
         let now = Troubles { totals, frames_superseded: 2, queries_dropped: 8 };
         let lines = trouble(&before, &now, WhenBehind::SlowDown);
-        assert_eq!(lines.len(), 4);
-        assert!(lines[1].contains("6 ticks were not published") && lines[2].contains("5 queries"), "{lines:?}");
+        assert_eq!(lines.len(), 5);
+        assert!(lines[1].contains("6 ticks were not published") && lines[2].contains("9 events"), "{lines:?}");
+        assert!(lines[3].contains("5 queries"), "{lines:?}");
         assert!(lines[0].contains("2 ticks") && lines[0].contains("83 ms"), "{lines:?}");
         let skipping =
             trouble(&before, &Troubles { totals: Totals { skipped_ticks: 3, ..ticks }, ..before }, WhenBehind::Skip);

@@ -8,11 +8,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use pita_game::pipeline::{self, Ports, Stage};
-use pita_game::{Arena, ArenaEvent, Command};
+use pita_game::{Arena, Command};
 use pita_protocol::message::{TICK_RECORDS_MAX, TickRecord};
 
 use crate::boarding::Boarding;
 use crate::drivers::{Drivers, Now};
+use crate::event_backlog::EventBacklog;
 use crate::frame::{Frame, KindFigures, Totals};
 use crate::pacer::Pacer;
 use crate::shared::{Phase, Shared};
@@ -50,8 +51,8 @@ struct Outside {
     begun_ns: u64,
     /// Stage that runs, and since when, ns.
     stage: Option<(Stage, u64)>,
-    /// What found no frame yet; bounded, because sessions are only opened by the thread that empties the frames.
-    events: Vec<ArenaEvent>,
+    /// What found no frame yet.
+    events: EventBacklog,
     records: Vec<TickRecord>,
 }
 
@@ -69,7 +70,7 @@ impl Outside {
             record: TickRecord::default(),
             begun_ns: 0,
             stage: None,
-            events: Vec::new(),
+            events: EventBacklog::default(),
             records: Vec::with_capacity(16),
         }
     }
@@ -102,7 +103,7 @@ impl Outside {
             self.records.push(self.record);
         }
         let Some(mut frame) = self.frame.take() else { return };
-        frame.events.append(&mut self.events);
+        self.events.hand_over(&mut frame.events);
         frame.records.append(&mut self.records);
         frame.totals = Totals {
             overruns: pacer.overruns(),
@@ -110,6 +111,7 @@ impl Outside {
             given_up_ns: pacer.given_up_ns(),
             quarantined: self.quarantined,
             frames_missed: self.frames_missed,
+            events_dropped: self.events.dropped(),
             inputs: self.drivers.counts(),
         };
         self.shared.frames.put_filled(frame);
@@ -186,7 +188,7 @@ impl Ports for Outside {
 
     fn output(&mut self, arena: &Arena) {
         self.measure(arena);
-        self.events.extend_from_slice(arena.events());
+        self.events.extend(arena.events());
         self.frame = self.shared.frames.take_free();
         match &mut self.frame {
             Some(frame) => {
