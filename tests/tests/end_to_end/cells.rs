@@ -237,6 +237,8 @@ async fn a_fifth_of_everything_lost_heals() {
 
 /// What the slow line takes, bytes/s: more than a session is always given, less than everything.
 const SLOW_BYTES_PER_S: u64 = 14_000;
+/// And that of one who subscribes to everything.
+const GREEDY_BYTES_PER_S: u64 = 2_000;
 /// For so long the frozen one is frozen: shorter than a connection may be silent.
 const FROZEN: Duration = Duration::from_millis(1500);
 /// How old a slow client's newest state may be once it has settled, ticks.
@@ -244,12 +246,18 @@ const AGE_MAX: u64 = 90;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_slow_client_gets_less_and_a_frozen_one_nothing_and_the_others_everything() {
-    let (server, _observer) = start(&busy_field()).await;
+    let (server, observer) = start(&busy_field()).await;
     let slow_line = Relay::start(&server.endpoint, 10_000_000).await.unwrap();
     let cold_line = Relay::start(&server.endpoint, 10_000_000).await.unwrap();
     let fast = connect(&server.endpoint, "fast").await;
     let slow = connect(&slow_line.endpoint, "slow").await;
     let cold = connect(&cold_line.endpoint, "cold").await;
+    // One who takes all cells, whatever it is granted, and reads hardly any of them.
+    let greedy_line = Relay::start(&server.endpoint, 10_000_000).await.unwrap();
+    let greedy = observer::open(&greedy_line.endpoint).await.unwrap();
+    let all_cells = format!("pita/{}/cell/**", observer.keys().arena());
+    let _unread = greedy.declare_subscriber(all_cells).await.unwrap();
+    greedy_line.set_rate(GREEDY_BYTES_PER_S);
     slow_line.set_rate(SLOW_BYTES_PER_S);
     let began = Instant::now();
     let (mut newest, mut behind, mut cold_behind) = (0, Vec::new(), u64::MAX);
