@@ -7,7 +7,7 @@ use clap::{Args, Parser, Subcommand};
 use pita_protocol::DEFAULT_ENDPOINT;
 use pita_protocol::build_info::VERSION_AND_COMMIT;
 
-use crate::config::TickRate;
+use crate::config::{TickRate, Within};
 use crate::{check, daemon, reload_command, simulate, status};
 
 /// Headless physics game server.
@@ -55,6 +55,9 @@ pub struct RunArgs {
     /// Ticks a second
     #[arg(long, value_name = "30|25")]
     pub tick_hz: Option<TickRate>,
+    /// Threads that integrate, 1 to 64
+    #[arg(long, value_name = "N")]
+    pub threads: Option<Within<1, 64>>,
 }
 
 /// Arguments of `check`.

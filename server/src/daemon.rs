@@ -113,6 +113,9 @@ fn configure(args: &RunArgs) -> Result<Configured, DaemonError> {
         config.arena.source.clone_from(arena);
     }
     config.arena.parameters.extend(args.parameters.iter().cloned());
+    if let Some(threads) = args.threads {
+        config.arena.threads = threads;
+    }
     if let Some(rate) = args.tick_hz {
         config.tick.tick_hz = rate;
     }

@@ -1,6 +1,7 @@
 //! Numbers that carry their allowed range in their type, so that whoever parses one also checks it.
 
 use std::fmt;
+use std::str::FromStr;
 
 use serde::{
     Deserialize, Deserializer,
@@ -15,6 +16,14 @@ impl<const MIN: u32, const MAX: u32> Within<MIN, MAX> {
     /// The number.
     pub fn get(self) -> u32 {
         self.0
+    }
+}
+
+impl<const MIN: u32, const MAX: u32> FromStr for Within<MIN, MAX> {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let within = text.parse().ok().filter(|number| (MIN..=MAX).contains(number));
+        within.map(Self).ok_or_else(|| format!("allowed is an integer from {MIN} to {MAX}"))
     }
 }
 

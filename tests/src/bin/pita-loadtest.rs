@@ -1,4 +1,4 @@
-//! `pita-loadtest`: how many clients one server carries; see [`pita_tests::loadtest`].
+//! `pita-loadtest`: how many clients, or cars of its own, one server carries; see [`pita_tests::loadtest`].
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -55,8 +55,8 @@ fn show(report: &Report, options: &Options) -> Result<(), String> {
 
 fn plot_file(report: &Report, folder: &Path) -> Result<PathBuf, String> {
     let file = folder.join("tick-time.svg");
-    let title = format!("Tick time against clients, {} at {} Hz", report.arena, report.tick_hz);
+    let title = format!("Tick time against {}, {} at {} Hz", report.counted.name(), report.arena, report.tick_hz);
     std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    plot::draw(&report.steps, &title, &file).map_err(|error| format!("{}: {error}", file.display()))?;
+    plot::draw(&report.steps, report.counted, &title, &file).map_err(|error| format!("{}: {error}", file.display()))?;
     Ok(file)
 }

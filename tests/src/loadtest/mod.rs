@@ -1,9 +1,10 @@
-//! `pita-loadtest`: how many clients one server carries.
+//! `pita-loadtest`: how many clients, or cars of its own, one server carries.
 //!
 //! Owns the ramp, its figures and how they are shown. Server and bots are processes of their own, so that CPU time is
 //! accounted to who spends it; what a tick costs is what the server itself records.
 
 pub mod bots;
+pub mod course;
 pub mod figures;
 pub mod options;
 pub mod plot;

@@ -1,4 +1,4 @@
-//! Tick time against clients, as SVG.
+//! Tick time against clients or vehicles, as SVG.
 
 use std::error::Error;
 use std::path::Path;
@@ -7,6 +7,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
 use super::figures::{FRAME_60_HZ_MS, Quantiles, TICK_30_HZ_MS};
+use super::options::Counted;
 use super::report::Step;
 
 /// Size of the picture, pixels.
@@ -20,20 +21,23 @@ type Drawn = Result<(), Box<dyn Error>>;
 ///
 /// # Errors
 /// Where `path` cannot be written.
-pub fn draw(steps: &[Step], title: &str, path: &Path) -> Drawn {
+pub fn draw(steps: &[Step], counted: Counted, title: &str, path: &Path) -> Drawn {
+    let mut steps = steps.to_vec();
+    steps.sort_by_key(|step| step.count);
+    let steps = &steps[..];
     let root = SVGBackend::new(path, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
-    let clients_end = steps.iter().map(|step| step.clients).max().unwrap_or(1).max(1) as f64 * 1.02;
+    let count_end = steps.iter().map(|step| step.count).max().unwrap_or(1).max(1) as f64 * 1.02;
     let tick_end_ms = steps.iter().map(|step| step.ticks.tick.p99_ms).fold(TICK_30_HZ_MS, f64::max) * 1.15;
     let mut chart = ChartBuilder::on(&root)
         .caption(title, ("sans-serif", 20))
         .margin(16)
         .x_label_area_size(44)
         .y_label_area_size(56)
-        .build_cartesian_2d(0.0..clients_end, 0.0..tick_end_ms)?;
+        .build_cartesian_2d(0.0..count_end, 0.0..tick_end_ms)?;
     chart
         .configure_mesh()
-        .x_desc("clients")
+        .x_desc(counted.name())
         .y_desc("tick time, ms")
         .x_label_formatter(&|x| if x.fract() == 0.0 { x.to_string() } else { String::new() })
         .y_label_formatter(&|y| format!("{y:.0}"))
@@ -55,9 +59,9 @@ pub fn draw(steps: &[Step], title: &str, path: &Path) -> Drawn {
 }
 
 fn draw_limit(chart: &mut Chart, limit_ms: f64, label: &'static str) -> Drawn {
-    let clients_end = chart.x_range().end;
-    let above = (clients_end * 0.93, limit_ms + chart.y_range().end * 0.035);
-    chart.draw_series(LineSeries::new([(0.0, limit_ms), (clients_end, limit_ms)], BLACK.mix(0.7).stroke_width(2)))?;
+    let count_end = chart.x_range().end;
+    let above = (count_end * 0.93, limit_ms + chart.y_range().end * 0.035);
+    chart.draw_series(LineSeries::new([(0.0, limit_ms), (count_end, limit_ms)], BLACK.mix(0.7).stroke_width(2)))?;
     chart.draw_series([Text::new(label, above, ("sans-serif", 13))])?;
     Ok(())
 }
@@ -69,7 +73,7 @@ fn draw_curve(
     colour: RGBColor,
     of: impl Fn(&Quantiles) -> f64,
 ) -> Drawn {
-    let points: Vec<_> = steps.iter().map(|step| (step.clients as f64, of(&step.ticks.tick))).collect();
+    let points: Vec<_> = steps.iter().map(|step| (step.count as f64, of(&step.ticks.tick))).collect();
     chart
         .draw_series(LineSeries::new(points.iter().copied(), colour.stroke_width(2)))?
         .label(name)
@@ -84,7 +88,7 @@ fn draw_starved(chart: &mut Chart, steps: &[Step]) -> Drawn {
         return Ok(());
     }
     chart
-        .draw_series(starved.iter().map(|step| Cross::new((step.clients as f64, step.ticks.tick.p99_ms), 9, BLACK)))?
+        .draw_series(starved.iter().map(|step| Cross::new((step.count as f64, step.ticks.tick.p99_ms), 9, BLACK)))?
         .label("bots starved")
         .legend(|(x, y)| Cross::new((x + 10, y), 5, BLACK));
     Ok(())

@@ -6,8 +6,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use pita_protocol::message::{Status, TickRecord};
 
 use super::bots::Bots;
+use super::course::Course;
 use super::figures::TickFigures;
-use super::options::Options;
+use super::options::{Counted, Options};
 use super::report::{Report, Step};
 use super::server;
 use super::{STARVED_LATENESS_TICKS, this_program};
@@ -33,37 +34,51 @@ pub enum LoadTestError {
     /// The server does not answer.
     #[error(transparent)]
     Observer(#[from] ObserverError),
+    /// The options do not say what to do.
+    #[error("{0}")]
+    Unclear(String),
     /// The server does not get on.
     #[error("{0}")]
     Stuck(String),
 }
 
-/// Runs the whole ramp: starts a server unless told of one, measures each number of clients, ends the server in order.
+/// Runs the whole ramp: starts a server unless told of one, measures each number, ends the server in order. Where vehicles
+/// are counted, each number has a server of its own.
 ///
 /// # Errors
 /// [`LoadTestError`] before the first step: what did not run, with what it printed. A step that fails ends the ramp, and
 /// clients may be lost: the report has both.
 pub async fn run(options: &Options) -> Result<Report, LoadTestError> {
-    if let Some(endpoint) = &options.connect {
-        return ramp(endpoint, options, None).await;
-    }
+    let (counted, counts) = options.counts().map_err(LoadTestError::Unclear)?;
+    let mut course = Course::new(counts, options.until);
     let cores = server::cores(options);
-    let server = ServerProcess::start(&mut server::command(options, &cores))?;
-    let mut report = ramp(&server.endpoint, options, Some(cores)).await?;
+    if let Counted::Vehicles { clients } = counted {
+        return with_servers_of_their_own(options, &cores, clients, &mut course).await;
+    }
+    if let Some(endpoint) = &options.connect {
+        return ramp(endpoint, options, None, &mut course).await;
+    }
+    let server = ServerProcess::start(&mut server::command(options, &cores, None))?;
+    let mut report = ramp(&server.endpoint, options, Some(cores), &mut course).await?;
     if let Err(error) = server.stop() {
         report.fail(error.to_string());
     }
     Ok(report)
 }
 
-async fn ramp(endpoint: &str, options: &Options, server_cores: Option<Vec<usize>>) -> Result<Report, LoadTestError> {
+async fn ramp(
+    endpoint: &str,
+    options: &Options,
+    server_cores: Option<Vec<usize>>,
+    course: &mut Course,
+) -> Result<Report, LoadTestError> {
     let observer = Observer::connect(endpoint).await?;
-    let status = observer.status().await?;
-    let mut report = Report::new(status.version, status.arena, status.tick_hz, server_cores);
-    for &clients in &options.clients {
-        match measure(&observer, endpoint, options, usize::from(clients)).await {
+    let mut report = Report::new(&observer.status().await?, Counted::Clients, server_cores, options.until);
+    while let Some(clients) = course.next() {
+        match measure(&observer, endpoint, options, (Counted::Clients, clients)).await {
             Ok(step) => {
-                eprintln!("{}", step.line());
+                course.saw(step.ticks.tick.p99_ms);
+                eprintln!("{}", step.line(Counted::Clients));
                 report.push(step);
             }
             Err(error) => {
@@ -75,14 +90,50 @@ async fn ramp(endpoint: &str, options: &Options, server_cores: Option<Vec<usize>
     Ok(report)
 }
 
+/// The ramp where vehicles are counted.
+async fn with_servers_of_their_own(
+    options: &Options,
+    cores: &[usize],
+    clients: u16,
+    course: &mut Course,
+) -> Result<Report, LoadTestError> {
+    let counted = Counted::Vehicles { clients };
+    let mut report: Option<Report> = None;
+    while let Some(vehicles) = course.next() {
+        let step = async {
+            let server = ServerProcess::start(&mut server::command(options, cores, Some(vehicles)))?;
+            let observer = Observer::connect(&server.endpoint).await?;
+            let status = observer.status().await?;
+            let step = measure(&observer, &server.endpoint, options, (counted, vehicles)).await?;
+            server.stop()?;
+            Ok::<_, LoadTestError>((status, step))
+        };
+        match (step.await, &mut report) {
+            (Ok((status, step)), report) => {
+                course.saw(step.ticks.tick.p99_ms);
+                eprintln!("{}", step.line(counted));
+                let fresh = || Report::new(&status, counted, Some(cores.to_vec()), options.until);
+                report.get_or_insert_with(fresh).push(step);
+            }
+            (Err(error), Some(report)) => {
+                report.fail(format!("{vehicles} vehicles: {error}"));
+                break;
+            }
+            (Err(error), None) => return Err(error),
+        }
+    }
+    report.ok_or_else(|| LoadTestError::Unclear("no number of vehicles was given".to_owned()))
+}
+
 /// One step: bots join, settle, are measured and leave.
 async fn measure(
     observer: &Observer,
     endpoint: &str,
     options: &Options,
-    clients: usize,
+    (counted, count): (Counted, u16),
 ) -> Result<Step, LoadTestError> {
-    let progress = progress_bar(clients, options.ticks);
+    let clients = usize::from(if let Counted::Vehicles { clients } = counted { clients } else { count });
+    let progress = progress_bar(&format!("{count} {}", counted.name()), options.ticks);
     let others = observer.status().await?.clients;
     let mut bots = Bots::start(&this_program(), endpoint, clients, options.script, options.conditioner.as_deref())?;
     progress.set_message("joining");
@@ -104,6 +155,7 @@ async fn measure(
 
     let tick_ms = 1000.0 / f64::from(after.tick_hz.max(1));
     Ok(Step {
+        count: usize::from(count),
         clients,
         ticks: TickFigures::of(&records, after.tick_hz),
         server_cpu_cores: (after.cpu_s - before.cpu_s) / (after.uptime_s - before.uptime_s).max(f64::MIN_POSITIVE),
@@ -159,9 +211,9 @@ async fn await_status(
     }
 }
 
-fn progress_bar(clients: usize, ticks: u64) -> ProgressBar {
+fn progress_bar(prefix: &str, ticks: u64) -> ProgressBar {
     // The template is a constant; should indicatif refuse it, its own default serves.
     let style = ProgressStyle::with_template("{prefix:>12} {bar:32} {pos}/{len} ticks, {msg}, {elapsed} (left {eta})")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(ticks).with_style(style).with_prefix(format!("{clients} clients"))
+    ProgressBar::new(ticks).with_style(style).with_prefix(prefix.to_owned())
 }

@@ -1,15 +1,18 @@
 //! What the load test says: tables and a verdict for people, one object for machines. Pure.
 
 use pita_protocol::build_info;
-use pita_protocol::message::STAGE_NAMES;
+use pita_protocol::message::{STAGE_NAMES, Status};
 use serde::{Deserialize, Serialize};
 
 use super::figures::{FRAME_60_HZ_MS, TICK_30_HZ_MS, TickFigures};
+use super::options::Counted;
 use crate::table::table;
 
 /// One step of the ramp.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Step {
+    /// The number that was tried, of what the report says.
+    pub count: usize,
     /// Clients asked for.
     pub clients: usize,
     /// What the ticks cost.
@@ -65,38 +68,48 @@ pub struct Report {
     pub cores: usize,
     /// Cores that the server was pinned to; `None` for a server that ran already.
     pub server_cores: Option<Vec<usize>>,
+    /// What the numbers are of.
+    pub counted: Counted,
+    /// Limit of the p99 tick time that the run looked for, ms.
+    pub until_ms: Option<f64>,
+    /// Largest number below every one that passed it.
+    pub within_until: Option<usize>,
     /// The steps, in the order in which they ran.
     pub steps: Vec<Step>,
     /// Why the ramp ended before its last step.
     pub failure: Option<String>,
-    /// First number of clients at which the p99 tick time passed 16.7 ms.
-    pub p99_over_16_7_ms_at_clients: Option<usize>,
-    /// First number of clients at which the p99 tick time passed 33.3 ms.
-    pub p99_over_33_3_ms_at_clients: Option<usize>,
+    /// First number at which the p99 tick time passed 16.7 ms.
+    pub p99_over_16_7_ms_at: Option<usize>,
+    /// First number at which the p99 tick time passed 33.3 ms.
+    pub p99_over_33_3_ms_at: Option<usize>,
 }
 
 impl Report {
     /// A report of no steps yet.
-    pub fn new(server_version: String, arena: String, tick_hz: u16, server_cores: Option<Vec<usize>>) -> Self {
+    pub fn new(server: &Status, counted: Counted, server_cores: Option<Vec<usize>>, until_ms: Option<f64>) -> Self {
         Self {
             version: build_info::VERSION_AND_COMMIT,
-            server_version,
-            arena,
-            tick_hz,
+            server_version: server.version.clone(),
+            arena: server.arena.clone(),
+            tick_hz: server.tick_hz,
             cores: std::thread::available_parallelism().map_or(1, usize::from),
             server_cores,
+            counted,
+            until_ms,
+            within_until: None,
             steps: Vec::new(),
             failure: None,
-            p99_over_16_7_ms_at_clients: None,
-            p99_over_33_3_ms_at_clients: None,
+            p99_over_16_7_ms_at: None,
+            p99_over_33_3_ms_at: None,
         }
     }
 
     /// Adds the next step.
     pub fn push(&mut self, step: Step) {
         self.steps.push(step);
-        self.p99_over_16_7_ms_at_clients = self.first_over(FRAME_60_HZ_MS).map(|step| step.clients);
-        self.p99_over_33_3_ms_at_clients = self.first_over(TICK_30_HZ_MS).map(|step| step.clients);
+        self.p99_over_16_7_ms_at = self.first_over(FRAME_60_HZ_MS).map(|step| step.count);
+        self.p99_over_33_3_ms_at = self.first_over(TICK_30_HZ_MS).map(|step| step.count);
+        self.within_until = self.until_ms.and_then(|limit| self.largest_within(limit));
     }
 
     /// Bots lost in all steps together.
@@ -124,6 +137,7 @@ impl Report {
         );
         text += &self.verdict(FRAME_60_HZ_MS);
         text += &self.verdict(TICK_30_HZ_MS);
+        text += &self.until_ms.map_or_else(String::new, |limit| self.how_far(limit));
         if self.steps.iter().any(|step| step.bots_starved) {
             text += "* the bots starved for a core in this step: its figures are those of the shared machine\n";
         }
@@ -136,38 +150,71 @@ impl Report {
         text
     }
 
+    /// The smallest number at which the limit was passed.
     fn first_over(&self, limit_ms: f64) -> Option<&Step> {
-        self.steps.iter().find(|step| step.ticks.tick.p99_ms > limit_ms)
+        let over = self.steps.iter().filter(|step| step.ticks.tick.p99_ms > limit_ms);
+        over.min_by_key(|step| step.count)
+    }
+
+    /// The largest number below all at which the limit was passed.
+    fn largest_within(&self, limit_ms: f64) -> Option<usize> {
+        let end = self.first_over(limit_ms).map_or(usize::MAX, |step| step.count);
+        self.steps.iter().map(|step| step.count).filter(|&count| count < end).max()
+    }
+
+    fn how_far(&self, limit_ms: f64) -> String {
+        let what = self.counted.name();
+        let beyond = self.first_over(limit_ms).map(|step| step.count);
+        match (self.largest_within(limit_ms), beyond) {
+            (Some(within), Some(beyond)) => {
+                format!("it goes as far as {within} {what}: p99 within {limit_ms} ms there, not at {beyond}\n")
+            }
+            (Some(within), None) => {
+                format!("it goes farther than was tried: p99 within {limit_ms} ms at {within} {what}\n")
+            }
+            (None, _) => format!("p99 was within {limit_ms} ms at no number of {what} that was tried\n"),
+        }
     }
 
     /// A line about one limit. Where a tick's own work is within the limit it says so: the machine was shared.
     fn verdict(&self, limit_ms: f64) -> String {
+        let what = self.counted.name();
         let Some(step) = self.first_over(limit_ms) else {
-            return format!("p99 stays within {limit_ms:.1} ms up to {} clients\n", self.clients_max());
+            return format!("p99 stays within {limit_ms:.1} ms up to {} {what}\n", self.count_max());
         };
-        let (clients, cpu_ms, wait_ms) = (step.clients, step.ticks.cpu.p99_ms, step.ticks.wait.p99_ms);
+        let (count, cpu_ms, wait_ms) = (step.count, step.ticks.cpu.p99_ms, step.ticks.wait.p99_ms);
         let waited = if cpu_ms <= limit_ms {
             format!("; its thread's CPU time does not: p99 {} ms, wait for a core {} ms", ms(cpu_ms), ms(wait_ms))
         } else {
             String::new()
         };
-        format!("p99 first passes {limit_ms:.1} ms at {clients} clients{waited}\n")
+        format!("p99 first passes {limit_ms:.1} ms at {count} {what}{waited}\n")
     }
 
-    fn clients_max(&self) -> usize {
-        self.steps.iter().map(|step| step.clients).max().unwrap_or(0)
+    fn count_max(&self) -> usize {
+        self.steps.iter().map(|step| step.count).max().unwrap_or(0)
     }
 
     fn tick_table(&self) -> comfy_table::Table {
         let header = [
-            "clients", "ticks", "bodies", "DOF", "contacts", "p50", "p95", "p99", "max", "late p99", "overruns",
+            self.counted.name(),
+            "ticks",
+            "bodies",
+            "DOF",
+            "contacts",
+            "p50",
+            "p95",
+            "p99",
+            "max",
+            "late p99",
+            "overruns",
             "skipped",
         ];
         table(
             &header,
             self.steps.iter().map(|step| {
                 let ticks = &step.ticks;
-                let mut row = vec![step.marked_clients()];
+                let mut row = vec![step.marked_count()];
                 row.extend([ticks.ticks, ticks.bodies as usize, ticks.dof_awake as usize].map(|n| n.to_string()));
                 row.push(ticks.contacts.to_string());
                 row.extend([ticks.tick.p50_ms, ticks.tick.p95_ms, ticks.tick.p99_ms, ticks.tick.max_ms].map(ms));
@@ -178,7 +225,7 @@ impl Report {
     }
 
     fn stage_table(&self) -> comfy_table::Table {
-        let mut header = vec!["clients"];
+        let mut header = vec![self.counted.name()];
         header.extend(STAGE_NAMES);
         header.extend(["CPU", "wait for a core"]);
         table(
@@ -187,14 +234,14 @@ impl Report {
                 let thread = [step.ticks.cpu, step.ticks.wait];
                 let cells = step.ticks.stages.iter().map(|stage| stage.wall).chain(thread);
                 let cells = cells.map(|q| format!("{} / {}", ms(q.p50_ms), ms(q.p99_ms)));
-                std::iter::once(step.marked_clients()).chain(cells).collect()
+                std::iter::once(step.marked_count()).chain(cells).collect()
             }),
         )
     }
 
     fn process_table(&self) -> comfy_table::Table {
         let header = [
-            "clients",
+            self.counted.name(),
             "server CPU %",
             "server MiB",
             "kB/s to a client",
@@ -210,7 +257,7 @@ impl Report {
             self.steps.iter().map(|step| {
                 let bots = &step.bots;
                 vec![
-                    step.marked_clients(),
+                    step.marked_count(),
                     format!("{:.0}", 100.0 * step.server_cpu_cores),
                     format!("{:.0}", step.server_memory_bytes as f64 / f64::from(1 << 20)),
                     format!("{:.1}", bots.received_bytes_per_s_per_client / 1000.0),
@@ -228,15 +275,15 @@ impl Report {
 
 impl Step {
     /// The step on one line, while the ramp goes on.
-    pub fn line(&self) -> String {
+    pub fn line(&self, counted: Counted) -> String {
         let (tick, late) = (&self.ticks.tick, self.bots.late_p99_ms);
         let (p50, p99, max) = (ms(tick.p50_ms), ms(tick.p99_ms), ms(tick.max_ms));
-        let clients = self.marked_clients();
-        format!("{clients:>4} clients: tick p50 {p50} p99 {p99} max {max} ms; bots late p99 {} ms", measured_ms(late))
+        let (count, what) = (self.marked_count(), counted.name());
+        format!("{count:>4} {what}: tick p50 {p50} p99 {p99} max {max} ms; bots late p99 {} ms", measured_ms(late))
     }
 
-    fn marked_clients(&self) -> String {
-        format!("{}{}", self.clients, if self.bots_starved { "*" } else { "" })
+    fn marked_count(&self) -> String {
+        format!("{}{}", self.count, if self.bots_starved { "*" } else { "" })
     }
 }
 
@@ -258,17 +305,19 @@ mod tests {
     use super::super::{figures::Quantiles, plot};
     use super::*;
 
-    fn step(clients: usize, p99_ms: f64) -> Step {
+    fn step(count: usize, p99_ms: f64) -> Step {
         let tick = Quantiles { p50_ms: p99_ms / 2.0, p95_ms: p99_ms, p99_ms, max_ms: 2.0 * p99_ms };
         Step {
-            clients,
+            count,
+            clients: count,
             ticks: TickFigures { ticks: 1000, tick, cpu: tick, ..Default::default() },
             ..Default::default()
         }
     }
 
     fn report(steps: impl IntoIterator<Item = Step>) -> Report {
-        let mut report = Report::new("0.1.0 (abc)".into(), "proving-ground".into(), 30, Some(vec![0, 1]));
+        let server = Status { arena: "proving-ground".into(), tick_hz: 30, ..Status::default() };
+        let mut report = Report::new(&server, Counted::Clients, Some(vec![0, 1]), Some(16.5));
         steps.into_iter().for_each(|step| report.push(step));
         report
     }
@@ -276,12 +325,32 @@ mod tests {
     #[test]
     fn the_verdict_names_the_first_count_over_each_limit() {
         let report = report([step(8, 9.0), step(16, 17.0), step(32, 16.0), step(64, 20.0)]);
-        assert_eq!(report.p99_over_16_7_ms_at_clients, Some(16));
-        assert_eq!(report.p99_over_33_3_ms_at_clients, None);
+        assert_eq!(report.p99_over_16_7_ms_at, Some(16));
+        assert_eq!(report.p99_over_33_3_ms_at, None);
         let text = report.text();
         assert!(text.contains("p99 first passes 16.7 ms at 16 clients"), "{text}");
         assert!(text.contains("p99 stays within 33.3 ms up to 64 clients"), "{text}");
         assert!(!text.contains("starved") && !text.contains("lost\n"), "{text}");
+    }
+
+    #[test]
+    fn the_verdict_says_how_far_it_goes() {
+        let report = report([step(16, 9.0), step(32, 17.0), step(64, 16.0), step(24, 16.4)]);
+        assert_eq!(report.within_until, Some(24));
+        assert!(
+            report.text().contains("as far as 24 clients: p99 within 16.5 ms there, not at 32"),
+            "{}",
+            report.text()
+        );
+    }
+
+    #[test]
+    fn vehicles_are_called_so() {
+        let counted = Counted::Vehicles { clients: 1 };
+        let mut report = Report::new(&Status::default(), counted, None, None);
+        report.push(Step { clients: 1, ..step(128, 12.0) });
+        let text = report.text();
+        assert!(text.contains("up to 128 vehicles") && !text.contains("clients\n"), "{text}");
     }
 
     #[test]
@@ -333,10 +402,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("plot.svg");
         let starved = Step { bots_starved: true, ..step(64, 50.0) };
-        plot::draw(&[step(1, 2.0), step(16, 17.0), starved], "Tick time", &path).unwrap();
+        plot::draw(&[step(1, 2.0), step(16, 17.0), starved], Counted::Clients, "Tick time", &path).unwrap();
         let svg = std::fs::read_to_string(&path).unwrap();
         assert!(svg.contains("16.7 ms") && svg.contains("33.3 ms") && svg.contains("bots starved"));
         assert_eq!(svg.matches("<circle").count(), 6);
-        plot::draw(&[], "nothing", &path).unwrap();
+        plot::draw(&[], Counted::Clients, "nothing", &path).unwrap();
     }
 }

@@ -17,8 +17,9 @@ pub fn cores(options: &Options) -> Vec<usize> {
     if options.cores.is_empty() { first_cores() } else { options.cores.clone() }
 }
 
-/// Command line that makes this program the server of `options`, pinned to `cores`.
-pub fn command(options: &Options, cores: &[usize]) -> Command {
+/// Command line that makes this program the server of `options`, pinned to `cores`; `vehicles` is how many cars it drives
+/// itself, unless its arena says.
+pub fn command(options: &Options, cores: &[usize], vehicles: Option<u16>) -> Command {
     let cores: Vec<String> = cores.iter().map(usize::to_string).collect();
     let mut command = Command::new(this_program());
     command.args(["serve", "--cores", &cores.join(","), "--", "run"]);
@@ -28,6 +29,10 @@ pub fn command(options: &Options, cores: &[usize]) -> Command {
     if let Some(arena) = &options.arena {
         command.args(["--arena", arena]);
     }
+    if let Some(vehicles) = vehicles {
+        command.args(["--set", &format!("drivers={vehicles}")]);
+    }
+    command.args(&options.server);
     command
 }
 

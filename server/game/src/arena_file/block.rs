@@ -12,7 +12,7 @@ const COPIES_MAX: usize = 4_096;
 pub struct Block {
     /// Place of the first, m.
     pub first: [f64; 3],
-    /// How many along x, y and z; at least one.
+    /// How many along x, y and z; 0 along any is none at all.
     pub copies: [usize; 3],
     /// Distance of neighbours along x, y and z, m.
     pub spacing: [f64; 3],
@@ -23,7 +23,7 @@ impl Block {
     /// [`ArenaError::OutOfRange`] for a number out of range, below `key`.
     pub fn check(&self, key: &Key) -> Result<(), ArenaError> {
         (0..3).try_for_each(|axis| {
-            key.at("copies").index(axis).count(self.copies[axis], 1, COPIES_MAX, "copies")?;
+            key.at("copies").index(axis).count(self.copies[axis], 0, COPIES_MAX, "copies")?;
             key.at("spacing").index(axis).number(self.spacing[axis], -1_000.0, 1_000.0, "m")
         })
     }
@@ -35,7 +35,7 @@ impl Block {
 
     /// Place of the last, m.
     pub fn last(&self) -> [f64; 3] {
-        [0, 1, 2].map(|axis| self.first[axis] + (self.copies[axis] - 1) as f64 * self.spacing[axis])
+        [0, 1, 2].map(|axis| self.first[axis] + self.copies[axis].saturating_sub(1) as f64 * self.spacing[axis])
     }
 
     /// Place of each, m, lowest layer first.

@@ -88,11 +88,30 @@ fn the_towns_rock_bears_a_car() {
     let (_, town) = ARENAS[1];
     let town =
         town.replace("[[spawn_grids]]\ncount = [10, 13]\nspacing = [8.0, 6.0]", "[[spawns]]\nposition = [72, 3, -38]");
-    let mut track = TestTrack::new(&town.replace("drivers = 6", "drivers = 0"), SETTINGS);
+    let mut track = TestTrack::new(&town.replace("\"$drivers\"", "0"), SETTINGS);
     track.enter(0);
     track.run(3.0, FULL_BRAKE);
     let at = track.car(0).position;
     assert!((1.5..2.4).contains(&at.y) && at.with_y(0.0).distance(DVec3::new(72.0, 0.0, -38.0)) < 2.0, "{at}");
+}
+
+/// A tornado, sheep and a market come where they are asked for, and drivers as many as there are places.
+#[test]
+fn the_desert_town_has_a_storm_where_one_is_asked_for() {
+    let (_, town) = ARENAS[1];
+    let actors = |given: &[(&str, i64)]| {
+        let given = given.iter().map(|&(name, value)| (name.to_owned(), value)).collect();
+        let text = arena_file::with_parameters(town, &given).unwrap();
+        let mut arena = Arena::from_toml(&text, &SETTINGS).unwrap_or_else(|error| panic!("{error}"));
+        pipeline::tick(&mut arena, &mut Recorder::default());
+        arena.logic().actors
+    };
+    let calm = actors(&[]);
+    assert_eq!(actors(&[("storm", 1)]), calm + 1 + 40 + 96);
+    assert_eq!(actors(&[("drivers", 128)]), calm + 128 - 6);
+    let many = [("drivers".to_owned(), 129)].into();
+    let error = arena_file::with_parameters(town, &many).unwrap_err().to_string();
+    assert!(error.contains("drivers is 129") && error.contains("0 to 128"), "{error}");
 }
 
 #[test]
