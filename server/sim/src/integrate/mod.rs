@@ -25,6 +25,7 @@ mod recovery;
 mod second_look;
 mod solver;
 mod step;
+mod threads;
 mod vector;
 mod wheels;
 

@@ -12,6 +12,7 @@ use super::gather::Active;
 use super::problem::{Problem, Unknown};
 use super::second_look::Onward;
 use super::solver::{SolveReport, Solvers, StoppedBecause};
+use super::threads;
 use crate::collide::{ContactPoint, SecondPoint};
 use crate::dof::{Body, BodyId, Placed};
 use crate::island::Islands;
@@ -95,8 +96,7 @@ pub(crate) struct Integrator {
 impl Integrator {
     /// An integrator that solves islands on `threads` threads.
     pub fn new(threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("island-{i}"));
-        let pool = if threads > 1 { Some(pool.build()?) } else { None };
+        let pool = threads::pool(threads)?;
         let pool_threads = pool.as_ref().map_or(0, rayon::ThreadPool::current_num_threads);
         let pool_workspaces = std::iter::repeat_with(Mutex::default).take(pool_threads).collect();
         Ok(Self { pool, pool_workspaces, ..Self::default() })
