@@ -26,7 +26,7 @@ impl Course {
     }
 
     /// The next number; `None` where it is known how far it goes, or nobody asked.
-    pub fn next(&mut self) -> Option<u16> {
+    pub fn advance(&mut self) -> Option<u16> {
         let next = match (self.given.last(), self.beyond, self.until_ms) {
             (Some(&given), None, _) | (Some(&given), Some(_), None) => {
                 self.given.pop();
@@ -43,7 +43,7 @@ impl Course {
         next
     }
 
-    /// Hears the p99 of a tick at the number that [`Course::next`] answered last, ms.
+    /// Hears the p99 of a tick at the number that [`Course::advance`] answered last, ms.
     pub fn saw(&mut self, p99_ms: f64) {
         if self.until_ms.is_some_and(|limit| p99_ms > limit) {
             self.beyond = Some(self.beyond.map_or(self.current, |beyond| beyond.min(self.current)));
@@ -61,7 +61,7 @@ mod tests {
     fn tried(given: &[u16], until_ms: Option<f64>) -> Vec<u16> {
         let mut course = Course::new(given.to_vec(), until_ms);
         let mut tried = Vec::new();
-        while let Some(n) = course.next() {
+        while let Some(n) = course.advance() {
             assert!(tried.len() < 50, "no end: {tried:?}");
             course.saw(f64::from(n));
             tried.push(n);
@@ -92,10 +92,10 @@ mod tests {
     #[test]
     fn noise_does_not_turn_the_search_round() {
         let mut course = Course::new(vec![8, 4], Some(10.0));
-        assert_eq!(course.next(), Some(8));
+        assert_eq!(course.advance(), Some(8));
         course.saw(9.0);
-        assert_eq!(course.next(), Some(4));
+        assert_eq!(course.advance(), Some(4));
         course.saw(11.0);
-        assert_eq!(course.next(), None);
+        assert_eq!(course.advance(), None);
     }
 }

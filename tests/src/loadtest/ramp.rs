@@ -74,7 +74,7 @@ async fn ramp(
 ) -> Result<Report, LoadTestError> {
     let observer = Observer::connect(endpoint).await?;
     let mut report = Report::new(&observer.status().await?, Counted::Clients, server_cores, options.until);
-    while let Some(clients) = course.next() {
+    while let Some(clients) = course.advance() {
         match measure(&observer, endpoint, options, (Counted::Clients, clients)).await {
             Ok(step) => {
                 course.saw(step.ticks.tick.p99_ms);
@@ -99,7 +99,7 @@ async fn with_servers_of_their_own(
 ) -> Result<Report, LoadTestError> {
     let counted = Counted::Vehicles { clients };
     let mut report: Option<Report> = None;
-    while let Some(vehicles) = course.next() {
+    while let Some(vehicles) = course.advance() {
         let step = async {
             let server = ServerProcess::start(&mut server::command(options, cores, Some(vehicles)))?;
             let observer = Observer::connect(&server.endpoint).await?;

@@ -36,6 +36,26 @@ fn a_short_load_test_measures_each_step_and_leaves_its_figures() {
     assert!(bodies[1] > bodies[0], "two more cars have more bodies: {bodies:?}");
 }
 
+/// A limit that no tick keeps: one server after the other is asked for fewer cars of its own, and the arena has them.
+#[test]
+fn the_load_test_finds_out_how_many_vehicles_go() {
+    let folder = tempfile::tempdir().unwrap();
+    let json = folder.path().join("figures.json");
+    let mut command = load_test();
+    command.args(["--arena", "desert-town", "--vehicles", "5", "--until", "0.01", "--ticks", "30"]);
+    command.arg("--out").arg(folder.path()).arg("--json").arg(&json).args(["--", "--threads", "2"]);
+    let Ended { success, said } = run(&mut command);
+    assert!(success && said.contains("p99 was within 0.01 ms at no number of vehicles that was tried"), "{said}");
+
+    let figures: Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
+    let steps = figures["steps"].as_array().unwrap();
+    let counts: Vec<_> = steps.iter().map(|step| step["count"].as_u64().unwrap()).collect();
+    assert_eq!(counts, [5, 2, 1]);
+    assert!(figures["within_until"].is_null() && steps.iter().all(|step| step["clients"] == 1), "{figures}");
+    let bodies = |step: usize| steps[step]["ticks"]["bodies"].as_u64().unwrap();
+    assert!(bodies(0) > bodies(2), "four more cars have more bodies: {} and {}", bodies(0), bodies(2));
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_load_test_measures_a_running_server_and_leaves_it_running() {
     let (server, observer) = start_server().await;
@@ -85,6 +105,9 @@ fn the_load_test_says_what_it_cannot_do() {
         (&["--connect", &nobody][..], &[nobody.as_str(), "cargo run --release"][..]),
         (&["--clients", "0"], &["--clients", "1..=1000"]),
         (&["--cores", "5000"], &["--cores", "5000"]),
+        (&["--until", "0"], &["--until", "0.01 to 10000 ms"]),
+        (&["--clients", "1,2", "--vehicles", "3"], &["--clients [1, 2]", "one number"]),
+        (&["--vehicles", "3", "--arena", "stress"], &["parameters is drivers", "one of size"]),
         (&["--arena", "atlantis"], &["atlantis", "proving-ground"]),
     ] {
         let Ended { success, said } = run(load_test().args(arguments));
