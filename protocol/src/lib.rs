@@ -14,6 +14,8 @@ pub mod chat;
 pub mod codec;
 pub mod description;
 pub mod dof;
+#[cfg(test)]
+mod hostile;
 pub mod input;
 pub mod keys;
 pub mod message;

@@ -1,4 +1,4 @@
-//! Streams over links that lose, delay, repeat and reorder, and against senders who mean harm.
+//! Streams over links that lose, delay, repeat and reorder.
 
 use proptest::prelude::*;
 
@@ -6,6 +6,7 @@ use super::*;
 use crate::WireError;
 
 mod cells;
+mod hostile;
 
 const RIGID: [Group; 2] = [Group::Point, Group::Rotation];
 
@@ -256,67 +257,6 @@ fn a_decoder_without_the_baseline_says_so_and_a_restart_heals_it() {
     encoder.restart();
     let snapshot = encoder.encode(11, &toys.state(), &[]);
     assert_eq!(known(&decoder.decode(11, &snapshot).unwrap()), told(&toys.state()));
-}
-
-/// A decoder with a past, a snapshot that it can decode next, and its tick.
-fn midstream(seed: u64) -> (Decoder, Vec<u8>, u64) {
-    let mut toys = Toys::new(seed, 25);
-    let (mut encoder, mut decoder) = (Encoder::default(), Decoder::default());
-    for tick in 1..20 {
-        toys.step();
-        let snapshot = encoder.encode(tick, &toys.state(), &[]);
-        decoder.decode(tick, &snapshot).unwrap();
-        encoder.acknowledge(tick, u32::MAX);
-    }
-    toys.step();
-    toys.add();
-    (decoder, encoder.encode(20, &toys.state(), &[]), 20)
-}
-
-#[test]
-fn flipped_bits_are_noticed_and_change_nothing() {
-    let (mut decoder, snapshot, tick) = midstream(3);
-    let before = decoder.newest().cloned();
-    let mut passed = 0;
-    for bit in 0..snapshot.len() * 8 {
-        let mut flipped = snapshot.clone();
-        flipped[bit / 8] ^= 1 << (bit % 8);
-        passed += u32::from(decoder.decode(tick, &flipped).is_ok());
-    }
-    // The check has 16 bits; bits at the very end may mean nothing.
-    assert!(passed < 8, "{passed} of {}", snapshot.len() * 8);
-    if passed == 0 {
-        assert_eq!(decoder.newest().cloned(), before);
-    }
-    assert!(decoder.decode(tick, &snapshot).is_ok());
-}
-
-#[test]
-fn hostile_bytes_are_errors_and_no_more() {
-    let (mut decoder, snapshot, tick) = midstream(4);
-    for length in 0..snapshot.len().saturating_sub(2) {
-        assert!(decoder.decode(tick, &snapshot[..length]).is_err(), "length {length}");
-    }
-    let mut dice = Dice(1234);
-    let mut bytes = Vec::new();
-    for round in 0..100_000 {
-        bytes.clear();
-        if round % 2 == 0 {
-            bytes.extend((0..dice.roll(120)).map(|_| dice.roll(256) as u8));
-            if let Some(flags) = bytes.first_mut() {
-                *flags &= 7;
-            }
-        } else {
-            bytes.extend_from_slice(&snapshot);
-            for _ in 0..1 + dice.roll(5) {
-                let at = dice.roll(bytes.len() as u64) as usize;
-                bytes[at] = dice.roll(256) as u8;
-            }
-        }
-        let of = if round % 3 == 0 { dice.roll(u64::MAX) } else { tick };
-        // Sixteen bits of check let one in 65536 pass.
-        let _ = decoder.decode(of, &bytes);
-    }
 }
 
 #[test]

@@ -123,7 +123,7 @@ impl<'a, C: Coder> Walk<'a, C> {
         let count = models.number(self.coder, number::ADDED, new.len() as u32) as usize;
         require(self.base.bodies.len() - removed + count <= BODIES_MAX, "bodies", "at most 16384")?;
         let mut added: Vec<Added> = Vec::new();
-        let mut after = 0u32;
+        let (mut after, mut groups) = (0u32, 0);
         for k in 0..count {
             let (body, layout) = new.get(k).map_or((None, Vec::new()), |&body| {
                 let groups = self.source().map(|s| s.state.groups(body)).unwrap_or_default();
@@ -142,6 +142,9 @@ impl<'a, C: Coder> Walk<'a, C> {
                 None if same => return Err(WireError::Malformed),
                 _ => self.layout(body.map_or(0, |body| body.kind), &layout)?,
             };
+            // A bit says that a body has as many groups as the one before.
+            groups += layout.len();
+            require(groups <= GROUPS_MAX, "groups of new bodies", "at most 65536")?;
             added.push(Added { id, kind, parent, layout });
         }
         Ok(added)
