@@ -22,6 +22,9 @@ pub use own_stream::{Head, OwnStream};
 pub use stream::Published;
 use stream::Stream;
 
+/// Most cells, 50 kB each and more; whoever is outside them is in the cell of what has no place, which all take.
+const CELLS_MAX: usize = 1024;
+
 /// How the world is divided and sent.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
@@ -75,18 +78,24 @@ impl Cells {
         let Self { settings, division, streams, published, offers, over } = self;
         let (families, of_bodies) = (crowd.families(), crowd.of_bodies());
         streams.values_mut().for_each(Stream::clear);
-        let mut moved = Vec::new();
-        division.follow(families, |family, from| moved.push((family, from)));
-        for (family, from) in moved {
-            let members = world.bodies().iter().zip(of_bodies).filter(|(_, of)| **of as usize == family);
-            if let Some(stream) = streams.get_mut(&from) {
-                stream.left(tick, division.cell_of(family), members.map(|(body, _)| body.id).collect());
-            }
-        }
+        // In order of family.
+        let mut moved: Vec<(usize, CellId, Vec<u32>)> = Vec::new();
+        division.follow(families, |family, from| moved.push((family, from, Vec::new())));
         for (body, &family) in world.bodies().iter().zip(of_bodies) {
-            let cell = division.cell_of(family as usize);
+            let mut cell = division.cell_of(family as usize);
+            if streams.len() >= CELLS_MAX && !streams.contains_key(&cell) {
+                cell = CellId::EVERYWHERE;
+            }
+            if let Ok(at) = moved.binary_search_by_key(&(family as usize), |(family, ..)| *family) {
+                moved[at].2.push(body.id);
+            }
             let stream = streams.entry(cell).or_insert_with(|| Stream::new(cell, settings, *world.precision()));
             stream.add(world, body, &families[family as usize]);
+        }
+        for (family, from, bodies) in moved {
+            if let Some(stream) = streams.get_mut(&from) {
+                stream.left(tick, division.cell_of(family), bodies);
+            }
         }
         published.clear();
         published.extend(streams.values_mut().filter_map(|stream| stream.publish(tick)));

@@ -259,3 +259,24 @@ fn a_crowded_cell_keeps_to_its_bytes_and_everybody_has_a_turn() {
     let oldest = known.iter().filter(|(id, _)| **id < 50_000).map(|(_, at)| 300 - at).max().unwrap();
     assert!((2..60).contains(&oldest), "{oldest} ticks");
 }
+
+#[test]
+fn a_world_that_is_scattered_far_and_wide_makes_no_more_cells_than_are_bounded() {
+    let mut cells = Cells::new(settings());
+    let mut field = Field::new(0, 1);
+    for tick in 1..=2 {
+        field.at(tick);
+        (0..3000).for_each(|i| field.add(None, 10 + i, [f64::from(i % 60) * 100.0, f64::from(i / 60) * 100.0], None));
+        cells.tick(tick, &field.state, &field.crowd);
+    }
+    let mut seen = BTreeSet::new();
+    for cell in cells.streams.keys().copied().collect::<Vec<_>>() {
+        let mut decoder = CellDecoder::default();
+        for keyframe in cells.epoch(cell) {
+            let frame = decoder.decode(keyframe.tick, &keyframe.dof, true).unwrap();
+            seen.extend(frame.bodies().map(|(body, _)| body.id));
+        }
+    }
+    assert!(cells.streams.len() <= CELLS_MAX + 1, "{} cells", cells.streams.len());
+    assert_eq!(seen.len(), 3002, "everybody is somewhere");
+}

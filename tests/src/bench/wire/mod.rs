@@ -117,7 +117,7 @@ fn arena(trace: &Trace, report: &mut Report) -> Result<(), EntryError> {
         Bar { what, key, unit, bar, others: "" }.compare(report, ours, lossy);
     };
     let bytes = [&clean, &lossy].map(|cost| kilobytes(cost, trace));
-    compare("arena with 64 cars, 30 Hz", "arena64_kBps", "kB/s", 24.0, bytes[0], Some(bytes[1]));
+    compare("arena with 64 cars, 30 Hz, one stream", "arena64_kBps", "kB/s", 24.0, bytes[0], Some(bytes[1]));
     compare("  off at rest", "arena64_rest_error_mm", "mm", 5.0, clean.rest.0, Some(lossy.rest.0));
     compare("  turned at rest", "arena64_rest_error_deg", "°", 0.2, clean.rest.1, Some(lossy.rest.1));
     compare("  off in motion", "arena64_motion_error_mm", "mm", 20.0, clean.motion.0, Some(lossy.motion.0));
@@ -125,6 +125,8 @@ fn arena(trace: &Trace, report: &mut Report) -> Result<(), EntryError> {
     compare("  decoding a snapshot", "decode_us", "µs", 50.0, decode[0], Some(decode[1]));
     let side_m = ServerConfig::built_in().cells.side_m.get() as f32;
     let served = fan_out::run(trace, side_m)?;
+    let client = served.client_bytes * f64::from(trace.tick_hz) / 1e3;
+    compare("  a client that takes all cells", "arena64_client_kBps", "kB/s", 24.0, client, None);
     compare("  publishing for 200 clients", "encode200_ms", "ms", 2.0, served.encode_ms, None);
     for side_m in [side_m, 32.0, 128.0, 4096.0] {
         let served = fan_out::run(trace, side_m)?;
