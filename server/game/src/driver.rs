@@ -156,7 +156,10 @@ impl AiDriver {
             (Behaviour::Flee, Some(hunter)) => self.flee(motion, hunter),
             _ => self.follow_route(motion),
         };
-        self.recovery.watch(motion, wanted, step.dt)
+        self.recovery.watch(motion, wanted, step.dt).unwrap_or_else(|| {
+            step.respawn();
+            Controls::default()
+        })
     }
 
     /// The talk's sporadic processing: whom to mind.

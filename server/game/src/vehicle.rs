@@ -256,11 +256,10 @@ impl Actor for Vehicle {
     fn step(&mut self, step: &mut Step) -> Result<(), SimError> {
         let chassis = self.rig.chassis();
         let motion = Motion::of(step.world, chassis).ok_or(SimError::Gone { what: "the chassis" })?;
-        if let Some(controls) = self.driver.decide(&motion, step) {
-            self.controls = controls;
-        }
         if self.fighter.as_ref().is_some_and(Fighter::is_out) {
             self.controls = Controls { handbrake: true, ..Controls::default() };
+        } else if let Some(controls) = self.driver.decide(&motion, step) {
+            self.controls = controls;
         }
         if let Some(squash) = &mut self.squash {
             squash.follow(step.world, &motion)?;

@@ -1,4 +1,4 @@
-//! The arena's own drivers: they follow routes, hunt, flee, free themselves, fill places and give way.
+//! The arena's own drivers: they follow routes, hunt, flee, fill places and give way.
 
 use pita_game::ArenaEvent;
 use pita_sim::DVec3;
@@ -69,19 +69,6 @@ fn hunters_fire_at_what_is_in_front_of_them() {
     let is_saw = |event: &&ArenaEvent| matches!(event, ArenaEvent::ActorAdded(info) if info.kind == "saw");
     let shots = track.ports.events.iter().filter(is_saw).count();
     assert!(shots > 1, "{shots} shots");
-}
-
-/// A wall right in front of it: it backs out and goes on.
-#[test]
-fn who_is_stuck_frees_himself() {
-    let wall = "[[statics]]\nshape.box.half = [0.5, 2.0, 4.0]\nmaterial = \"asphalt\"\nposition = [30.0, 2.0, 40.0]\n";
-    let mut track = track(&format!("{wall}{}", driver("route")));
-    let mut least = f64::INFINITY;
-    for _ in 0..60 * 30 {
-        track.tick();
-        least = least.min(first(&track).with_y(0.0).distance(DVec3::new(-40.0, 0.0, 40.0)));
-    }
-    assert!(least < 10.0, "it came no nearer to the corner behind the wall than {least} m");
 }
 
 #[test]

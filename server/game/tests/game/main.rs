@@ -14,6 +14,7 @@ mod pasture;
 mod pipeline;
 mod players;
 mod props;
+mod recovery;
 mod rehearsals;
 mod reloads;
 mod reproducibility;

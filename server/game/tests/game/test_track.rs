@@ -1,7 +1,7 @@
 //! An arena with scripted ports, and what one wants to know of the cars in it.
 
 use pita_game::driver::Motion;
-use pita_game::{Arena, ArenaEvent, ArenaSettings, Command, Controls, Ports, Stage, pipeline};
+use pita_game::{ActorInfo, Arena, ArenaEvent, ArenaSettings, Command, Controls, Ports, Stage, pipeline};
 use pita_sim::{BodyId, DQuat, DVec3, DofKind, SimError, SliceView, World};
 
 /// Nothing but ground.
@@ -102,12 +102,20 @@ impl TestTrack {
         panic!("not reached within {seconds} s: {:?}", self.car(0));
     }
 
-    /// Motion of part `part` of the vehicle in `slot`; part 0 is the chassis.
-    pub fn part(&self, slot: u16, part: usize) -> Motion {
-        let info = self.arena.actor_of(slot).expect("somebody has the slot");
-        let serial = info.parts[part].slice;
+    fn info(&self, id: u32) -> &ActorInfo {
+        self.arena.actor(id).expect("it is there").describe()
+    }
+
+    /// Motion of part `part` of actor `id`; part 0 of a vehicle is the chassis.
+    pub fn part_of(&self, id: u32, part: usize) -> Motion {
+        let serial = self.info(id).parts[part].slice;
         let slice = self.arena.world().slices().find(|s| s.serial == serial).expect("a living body");
         motion(&slice)
+    }
+
+    /// The same of the vehicle in `slot`.
+    pub fn part(&self, slot: u16, part: usize) -> Motion {
+        self.part_of(self.id(slot), part)
     }
 
     /// Motion of the vehicle in `slot`.
@@ -146,9 +154,9 @@ impl TestTrack {
         (way / turned.abs(), turned / (ticks * self.dt))
     }
 
-    /// Changes bodies of the vehicle in `slot`, chassis first, from outside the game; its squash it leaves alone.
-    fn meddle(&mut self, slot: u16, meddle: impl Fn(&mut World, &[BodyId])) {
-        let slices: Vec<u32> = self.arena.actor_of(slot).expect("it is there").parts.iter().map(|p| p.slice).collect();
+    /// Changes bodies of actor `id`, chassis first, from outside the game; a squash it leaves alone.
+    fn meddle(&mut self, id: u32, meddle: impl Fn(&mut World, &[BodyId])) {
+        let slices: Vec<u32> = self.info(id).parts.iter().map(|p| p.slice).collect();
         let world = self.arena.world();
         let body = |slice: &u32| world.bodies().iter().copied().find(|&body| world.serial(body) == Some(*slice));
         let is_rigid = |body: &BodyId| world.slice(*body).is_some_and(|slice| slice.kind == DofKind::RigidBody);
@@ -161,9 +169,18 @@ impl TestTrack {
         assert!(nothing.is_err());
     }
 
+    fn id(&self, slot: u16) -> u32 {
+        self.arena.actor_of(slot).expect("somebody has the slot").id
+    }
+
     /// Puts the whole car to where its chassis is at `position`, turned by `turn`, with the velocity `velocity`.
     pub fn place(&mut self, slot: u16, position: DVec3, turn: DQuat, velocity: DVec3) {
-        self.meddle(slot, |world, bodies| {
+        self.place_actor(self.id(slot), position, turn, velocity);
+    }
+
+    /// The same for actor `id`.
+    pub fn place_actor(&mut self, id: u32, position: DVec3, turn: DQuat, velocity: DVec3) {
+        self.meddle(id, |world, bodies| {
             let (from, back) = (world.position(bodies[0]).unwrap(), world.rotation(bodies[0]).unwrap().inverse());
             for &body in bodies {
                 let arm = turn * back * (world.position(body).unwrap() - from);
@@ -176,7 +193,7 @@ impl TestTrack {
 
     /// Gives the car a velocity, wheels that roll included, where it is.
     pub fn push(&mut self, slot: u16, velocity: DVec3) {
-        self.meddle(slot, |world, bodies| {
+        self.meddle(self.id(slot), |world, bodies| {
             for (part, &body) in bodies.iter().enumerate() {
                 let spin = if part == 0 { 0.0 } else { velocity.length() / 0.35 };
                 let axis = world.rotation(bodies[0]).unwrap() * DVec3::NEG_Z;
@@ -187,7 +204,7 @@ impl TestTrack {
 
     /// Turns the whole car about its chassis, rad/s.
     pub fn spin(&mut self, slot: u16, spin: DVec3) {
-        self.meddle(slot, |world, bodies| {
+        self.meddle(self.id(slot), |world, bodies| {
             let centre = world.position(bodies[0]).unwrap();
             for &body in bodies {
                 let velocity = world.velocity(body).unwrap() + spin.cross(world.position(body).unwrap() - centre);
