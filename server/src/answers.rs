@@ -8,8 +8,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
+use std::time::Duration;
 
-use pita_protocol::admin::{AdminReply, AdminRequest, CHALLENGE_BYTES};
+use pita_protocol::admin::{AdminReply, AdminRequest};
 use pita_protocol::message::{
     Description, JoinAccepted, JoinReply, JoinRequest, Keyframes, KeyframesRequest, Refusal, Role, SayRefusal,
     SayReply, SayRequest, TicksRequest,
@@ -20,7 +21,7 @@ use tokio::sync::mpsc::Sender as OrderSender;
 use zenoh::Wait;
 use zenoh::query::Query;
 
-use crate::admin::{Doorkeeper, Order, Verdict};
+use crate::admin::{Doorkeeper, NONCE_BYTES, Order, Verdict};
 use crate::metrics;
 use crate::sessions::{EndReason, JoinRefusal, Secrets, SessionId, Wish};
 use crate::shared::Shared;
@@ -179,8 +180,10 @@ impl Answering {
         let key_expr = self.shared.keys.admin();
         let fits = query.payload().filter(|payload| payload.len() <= AdminRequest::MAX_BYTES + TAG_BYTES);
         let sealed = fits.map(|payload| payload.to_bytes()).unwrap_or_default();
-        let verdict = match challenge() {
-            Ok(fresh) => self.doorkeeper.judge(&sealed, &key_expr, fresh),
+        let verdict = match nonce() {
+            Ok(nonce) => {
+                self.doorkeeper.judge(&sealed, &key_expr, Duration::from_millis(self.shared.clock.ms()), nonce)
+            }
             Err(_) => Verdict::Answer(AdminReply::Refused),
         };
         match verdict {
@@ -301,12 +304,12 @@ impl Answering {
     }
 }
 
-/// A challenge from the operating system.
-fn challenge() -> Result<[u8; CHALLENGE_BYTES], rand::rngs::SysError> {
+/// The random part of a challenge, from the operating system.
+fn nonce() -> Result<[u8; NONCE_BYTES], rand::rngs::SysError> {
     use rand::TryRng;
-    let mut fresh = [0; CHALLENGE_BYTES];
-    rand::rngs::SysRng.try_fill_bytes(&mut fresh)?;
-    Ok(fresh)
+    let mut nonce = [0; NONCE_BYTES];
+    rand::rngs::SysRng.try_fill_bytes(&mut nonce)?;
+    Ok(nonce)
 }
 
 /// Secrets from the operating system.

@@ -1,17 +1,17 @@
 //! Where an arena comes from: compiled in by name, or a file with what lies beside it.
 //!
-//! Owns all that reads arenas from the disk: only plain files, of bounded size, and of meshes only those in the folder
-//! of the arena's file or below.
+//! Owns all that reads arenas from the disk: of meshes only those in the folder of the arena's file or below.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use pita_game::arena_file::{self, ArenaFile, FILE_MAX};
 use pita_game::{ActorKinds, Arena, ArenaError, ArenaSettings, Reload, ReloadError, Supplies};
 use pita_protocol::message::{ArenaSource, SOURCE_FILES_BYTES_MAX, SOURCE_FILES_MAX, SourceFile};
 use pita_sim::geometry::FILE_MAX as GEOMETRY_MAX;
+
+use crate::files;
 
 /// Names and texts of the compiled-in arenas; the first is the default.
 pub const BUILT_IN: [(&str, &str); 4] = [
@@ -71,8 +71,7 @@ impl ArenaText {
             Some(&(name, text)) => Self::built_in(name, text),
             None => {
                 let unreadable = |reason| SourceError::Unreadable { source_name: source.to_owned(), reason };
-                let bytes = read_bounded(Path::new(source), FILE_MAX).map_err(unreadable)?;
-                let text = String::from_utf8(bytes).map_err(|e| unreadable(io::Error::other(e)))?;
+                let text = files::read_text(Path::new(source), FILE_MAX).map_err(unreadable)?;
                 Self::of_file(Path::new(source), text)
             }
         };
@@ -153,18 +152,7 @@ fn read_beside(folder: &Path, name: &str) -> io::Result<Vec<u8>> {
     if !path.starts_with(&folder) {
         return Err(io::Error::other("it leads out of the arena's folder"));
     }
-    read_bounded(&path, GEOMETRY_MAX)
-}
-
-/// The bytes of a plain file, and one byte more than `max` where it is longer, which is refused by who knows what it is.
-fn read_bounded(path: &Path, max: usize) -> io::Result<Vec<u8>> {
-    // Asked before it is opened: opening a pipe waits for who writes into it.
-    if !std::fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("it is no plain file"));
-    }
-    let mut bytes = Vec::new();
-    File::open(path)?.take(max as u64 + 1).read_to_end(&mut bytes)?;
-    Ok(bytes)
+    files::read(&path, GEOMETRY_MAX)
 }
 
 fn names() -> String {

@@ -5,11 +5,13 @@ use std::process::ExitCode;
 
 use comfy_table::{Table, presets};
 use pita_game::ArenaSettings;
+use pita_game::arena_file::FILE_MAX;
 use serde_json::json;
 
 use crate::arena_source::{ArenaText, BUILT_IN};
 use crate::cli::CheckArgs;
 use crate::config::{self, ServerConfig};
+use crate::files;
 use crate::report;
 
 /// Where configuration lies in a checkout.
@@ -97,7 +99,7 @@ fn toml_files(folder: &Path) -> Vec<PathBuf> {
 
 fn check_file(path: &Path) -> Checked {
     let file = path.display().to_string();
-    match std::fs::read_to_string(path) {
+    match files::read_text(path, FILE_MAX) {
         Ok(text) => match kind_of(path, &text) {
             Kind::Arena => check_arena(file, &ArenaText::of_file(path, text)),
             kind => check_server(file, kind, &text),

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use pita_protocol::dof::{Cadence, Precision, STEPS_MAX};
 use serde::Deserialize;
 
+use crate::files;
 pub use within::{KeyframeTicks, TickRate, Within};
 
 /// The defaults, and the documentation of every key.
@@ -18,6 +19,9 @@ pub const DEFAULT_TEXT: &str = include_str!("../../configs/server.toml");
 
 /// Name under which errors speak of [`DEFAULT_TEXT`].
 pub const BUILT_IN: &str = "built-in server.toml";
+
+/// Longest file, bytes.
+const FILE_MAX: usize = 1 << 20;
 
 /// The whole file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -252,7 +256,7 @@ impl ServerConfig {
     /// [`ConfigError`] naming file, key, value and allowed range.
     pub fn from_file(file: &Path) -> Result<Self, ConfigError> {
         let unreadable = |reason| ConfigError::Unreadable { file: file.to_owned(), reason };
-        Self::parse(&std::fs::read_to_string(file).map_err(unreadable)?, &file.display().to_string())
+        Self::parse(&files::read_text(file, FILE_MAX).map_err(unreadable)?, &file.display().to_string())
     }
 
     /// Checks `text`, laid over the defaults; errors call it `file`.

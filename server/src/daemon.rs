@@ -125,7 +125,8 @@ fn configure(args: &RunArgs) -> Result<Configured, DaemonError> {
     let file = args.config.as_ref().map_or(BUILT_IN.to_owned(), |file| file.display().to_string());
     config.precision.check_reach(arena.reach_m(), &file)?;
     let secret_file = Some(&config.admin.secret_file).filter(|file| !file.as_os_str().is_empty());
-    let doorkeeper = Doorkeeper::new(secret_file.map(|file| admin::read_secret(file)).transpose()?);
+    let secret = secret_file.map(|file| admin::read_secret(file)).transpose()?;
+    let doorkeeper = Doorkeeper::new(secret, admin::new_tag_key()?);
     Ok(Configured { config, arena, source: text.source(), doorkeeper })
 }
 

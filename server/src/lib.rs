@@ -27,6 +27,7 @@ pub mod daemon;
 pub mod description;
 pub mod drivers;
 pub mod event_backlog;
+pub mod files;
 pub mod frame;
 pub mod inputs;
 pub mod metrics;

@@ -12,8 +12,12 @@ use serde_json::json;
 
 use crate::arena_source::{ArenaText, SourceError};
 use crate::cli::SimulateArgs;
+use crate::files;
 use crate::report;
 use crate::trace::{self, Trace, TraceError};
+
+/// Longest scene file, bytes: as many lines as a scene may have, of a body each.
+const SCENE_BYTES_MAX: usize = 64 << 20;
 
 /// Why a run cannot start or go on.
 #[derive(Debug, thiserror::Error)]
@@ -71,7 +75,7 @@ impl Subject {
             return Ok(Self::Arena(arena));
         }
         let file = args.scene.display().to_string();
-        let text = std::fs::read_to_string(&args.scene)
+        let text = files::read_text(&args.scene, SCENE_BYTES_MAX)
             .map_err(|reason| SimulateError::Unreadable { file: file.clone(), reason })?;
         let (threads, dt) = (usize::from(args.threads), 1.0 / f64::from(tick_hz));
         let settings = Settings { threads, audit_energy: true, ..Settings::at(dt) };

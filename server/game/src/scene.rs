@@ -3,8 +3,8 @@
 //! One item a line; a body's index is the order of the `body` lines; a body's frame is its principal axes:
 //!
 //! ```text
-//! ticks T                                     number of ticks of the run
-//! gravity gx gy gz                            m/s²
+//! ticks T                                     number of ticks of the run, at most once
+//! gravity gx gy gz                            m/s², at most once
 //! plane nx ny nz mu                           static half-space through the origin
 //! body SHAPE a b c  mass Ix Iy Iz  px py pz  qw qx qy qz  vx vy vz  wx wy wz  mu collide
 //!      SHAPE box: half extents a b c; sphere: radius a; capsule: radius a, half segment b, along x
@@ -54,6 +54,12 @@ impl Scene {
             return Err(SceneError { line: LINES_MAX, what: format!("more than {LINES_MAX} lines") });
         }
         let mut settings = Settings { sleep: None, ..settings.clone() };
+        for word in ["ticks", "gravity"] {
+            let mut given = lines.iter().filter(|line| line.word == word);
+            if let (Some(first), Some(second)) = (given.next(), given.next()) {
+                return Err(second.error(&format!("{word} is given in line {} already", first.number)));
+            }
+        }
         if let Some(line) = lines.iter().find(|line| line.word == "gravity") {
             settings.gravity = line.numbers::<3>()?.into();
         }
@@ -199,7 +205,9 @@ mod tests {
     fn errors_name_line_and_reason() {
         for (text, expected) in [
             ("bodies 3", "line 1: expected ticks"),
-            ("ticks 1\nticks -3", "line 2: ticks must be 0 to 10000000"),
+            ("\nticks -3", "line 2: ticks must be 0 to 10000000"),
+            ("ticks 1\nplane 0 1 0 1\nticks 3", "line 3: ticks is given in line 1 already"),
+            ("gravity 0 -9 0\ngravity 0 -1 0", "line 2: gravity is given in line 1 already"),
             ("plane 0 0 0 1", "line 1: normal is 0"),
             ("plane 0 1 0", "line 1: plane takes 4 numbers, not 3"),
             ("gravity 0 NaN 0", "line 1: \"NaN\" is not a finite number"),

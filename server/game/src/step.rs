@@ -167,13 +167,13 @@ impl<'a> Step<'a> {
     }
 
     /// Asks for a new actor; answers the id that it will have. It is there from the next tick on, unless the engine
-    /// refuses it: then nothing of it stays behind, and nobody ever has that id.
+    /// refuses it: then nothing of it stays behind, and nobody has that id.
     pub fn add(
         &mut self,
         build: impl FnOnce(&mut World, u32) -> Result<Box<dyn Actor>, SimError> + Send + 'static,
     ) -> u32 {
-        let id = *self.next_actor;
-        *self.next_actor += 1;
+        let others = self.others;
+        let id = next_free(self.next_actor, |id| others.binary_search_by_key(&id, |other| other.id).is_ok());
         self.requests.push(Request::Add { id, build: Box::new(build) });
         id
     }
@@ -208,4 +208,15 @@ impl<'a> Step<'a> {
         let strength = strength.clamp(0.0, 1.0);
         self.requests.push(Request::Effect(Effect { kind, actor: self.id, position, direction, strength }));
     }
+}
+
+/// The first id from `next` on that is not taken, after the last one again from 0; `next` is what follows it. There are far
+/// more ids than actors.
+pub(crate) fn next_free(next: &mut u32, is_taken: impl Fn(u32) -> bool) -> u32 {
+    while is_taken(*next) {
+        *next = next.wrapping_add(1);
+    }
+    let id = *next;
+    *next = next.wrapping_add(1);
+    id
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use pita_sim::{Collider, Material, Settings, Shape, SimError, StaticDesc, World};
+use pita_sim::{Collider, Material, QueryFilter, Settings, Shape, SimError, StaticDesc, World};
 
 use super::cast::Cast;
 use super::placing::Placed;
@@ -13,6 +13,9 @@ use crate::arena_file::{ArenaError, ArenaFile, Key, Materials, shipped_file};
 use crate::kinds::{ActorKinds, Recipe};
 use crate::spawn::Pose;
 use crate::step::LogicReport;
+
+/// Parts of a car that are not farther within what stands in its place may be there at the start, m.
+const SPAWN_TOLERANCE: f64 = 0.02;
 
 /// What an arena may need beside its text.
 #[derive(Clone, Copy)]
@@ -88,6 +91,7 @@ impl Arena {
         };
         arena.set_material_pairs(file)?;
         arena.add_statics(file)?;
+        arena.check_spawns(file)?;
         arena.place_all(file, &recipes)?;
         // What was there from the start is in the description, it did not happen.
         arena.events.clear();
@@ -120,6 +124,24 @@ impl Arena {
         Ok(())
     }
 
+    /// Nobody starts within what never moves: he would be pushed out of it, to whichever side, or not come out.
+    fn check_spawns(&mut self, file: &ArenaFile) -> Result<(), ArenaError> {
+        // What was added is there for questions from now on.
+        self.world.detect_collisions();
+        let vehicle = &file.vehicle;
+        let half = DVec3::from(vehicle.chassis_half) - SPAWN_TOLERANCE;
+        let (shape, up) =
+            (Shape::Box { half: half.max(DVec3::splat(SPAWN_TOLERANCE)) }, DVec3::Y * vehicle.ride_height());
+        for (i, spawn) in self.spawns.iter().enumerate() {
+            let key = spawn_key(file, i);
+            let (at, rotation) = (spawn.position + up, spawn.rotation());
+            let inside = self.world.overlap(&shape, at, rotation, &QueryFilter::ALL).map_err(refused(&key))?;
+            let allowed = "a place where a car has room: a static is in the way";
+            key.require(inside.is_empty(), spawn.position, allowed)?;
+        }
+        Ok(())
+    }
+
     fn place_all(&mut self, file: &ArenaFile, recipes: &[Recipe]) -> Result<(), ArenaError> {
         for (i, recipe) in recipes.iter().enumerate() {
             let mut ids = Vec::new();
@@ -147,6 +169,21 @@ fn refused(key: &Key) -> impl FnOnce(SimError) -> ArenaError + use<> {
 /// Materials are checked to exist when the file is read.
 fn material(materials: &Materials, name: &str) -> Material {
     materials.get(name).copied().unwrap_or_default()
+}
+
+/// Where the file has the spawn point with this index among all.
+fn spawn_key(file: &ArenaFile, index: usize) -> Key {
+    let single = file.spawns.len();
+    if index < single {
+        return Key::new("spawns").index(index).at("position");
+    }
+    let (mut grid, mut left) = (0, index - single);
+    while let Some(points) = file.spawn_grids.get(grid).map(|grid| grid.count[0] * grid.count[1])
+        && left >= points
+    {
+        (grid, left) = (grid + 1, left - points);
+    }
+    Key::new("spawn_grids").index(grid).at("point").index(left)
 }
 
 pub(super) fn spawn_points(file: &ArenaFile) -> Vec<Pose> {

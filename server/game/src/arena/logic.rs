@@ -6,7 +6,7 @@ use super::{Arena, ArenaEvent};
 use crate::actor::{Actor, WhenLost};
 use crate::arena_file::{ACTORS_MAX, BoundsFile};
 use crate::spawn::{self, Pose};
-use crate::step::{EFFECTS_MAX, KindLogic, LogicReport, Other, Request, Step};
+use crate::step::{EFFECTS_MAX, KindLogic, LogicReport, Other, Request, Step, next_free};
 
 impl Arena {
     /// Lets every actor judge its collisions, sees to those who are lost, lets every actor act, in order of id, and does
@@ -138,11 +138,9 @@ impl Arena {
         self.logic.refused += usize::from(!is_granted);
     }
 
-    /// An id that no actor of this run ever had.
+    /// An id that no actor has; nobody had it before, unless this run gave out four thousand million.
     pub(super) fn new_id(&mut self) -> u32 {
-        let id = self.next_actor;
-        self.next_actor += 1;
-        id
+        next_free(&mut self.next_actor, |id| self.actors.contains_key(&id))
     }
 
     /// Adds an actor of a game's own: `build` is given the world, to add its bodies, and the actor's id.
@@ -165,6 +163,9 @@ impl Arena {
     ) -> Result<(), SimError> {
         if self.actors.len() >= ACTORS_MAX {
             return Err(SimError::Unusable { what: "an arena has at most 16384 actors" });
+        }
+        if self.actors.contains_key(&id) {
+            return Err(SimError::Unusable { what: "its id is that of another actor" });
         }
         let actor = whole_or_nothing(&mut self.world, |world| build(world, id))?;
         self.add(actor);
@@ -217,4 +218,30 @@ pub(super) fn whole_or_nothing<T>(
 /// Whether an actor is within the bounds.
 pub(super) fn is_inside(world: &World, bounds: &BoundsFile, actor: &dyn Actor) -> bool {
     actor.whereabouts().iter().all(|&body| world.position(body).is_none_or(|at| bounds.contains(at)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arena::{ArenaSettings, Command};
+
+    #[test]
+    fn ids_start_anew_after_the_last_and_nobody_is_given_another_ones() {
+        let text = include_str!("../../../../configs/arenas/flat.toml");
+        let mut arena = Arena::from_toml(text, &ArenaSettings { tick_hz: 30, threads: 1 }).unwrap();
+        let mut enter = |slot| {
+            arena.apply(Command::Enter { slot, name: "driver".to_owned() });
+            arena.slots.get(&slot).copied()
+        };
+        assert_eq!([enter(0), enter(1)], [Some(0), Some(1)]);
+        arena.next_actor = u32::MAX;
+        let mut enter = |slot| {
+            arena.apply(Command::Enter { slot, name: "driver".to_owned() });
+            arena.slots.get(&slot).copied()
+        };
+        assert_eq!([enter(2), enter(3)], [Some(u32::MAX), Some(2)]);
+        arena.run_logic();
+        assert_eq!(arena.actors.len(), 4);
+        assert!(arena.build_actor(2, |_, _| Err(SimError::Unusable { what: "it is not even tried" })).is_err());
+    }
 }

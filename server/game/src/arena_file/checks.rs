@@ -1,6 +1,6 @@
 //! The ranges of an arena file, and that its names refer to something.
 
-use super::{ArenaError, ArenaFile, Key, material, meshes};
+use super::{ArenaError, ArenaFile, BoundsFile, Key, material, meshes};
 
 /// Most statics and spawn points each, copies and grids counted.
 const THINGS_MAX: usize = 4_096;
@@ -50,6 +50,16 @@ impl ArenaFile {
         })
     }
 
+    /// What starts outside is lost at once, and put back to where it started.
+    fn check_car_inside(&self, key: &Key, point: [f64; 3]) -> Result<(), ArenaError> {
+        let ([aside, above], BoundsFile { min, max }) = (self.vehicle.reach(), self.bounds);
+        let [below, above] = [[aside, 0.0, aside], [aside, above, aside]];
+        (0..3).try_for_each(|axis| {
+            let (least, most) = (min[axis] + below[axis], max[axis] - above[axis]);
+            key.index(axis).number(point[axis], least, most, "m: a whole car is within the bounds there")
+        })
+    }
+
     fn check_statics(&self) -> Result<(), ArenaError> {
         let statics = Key::new("statics");
         let mut pieces = 0;
@@ -75,13 +85,13 @@ impl ArenaFile {
     fn check_spawns(&self) -> Result<(), ArenaError> {
         for (i, spawn) in self.spawns.iter().enumerate() {
             let key = Key::new("spawns").index(i);
-            self.check_inside(&key.at("position"), spawn.position)?;
+            self.check_car_inside(&key.at("position"), spawn.position)?;
             key.at("yaw").number(spawn.yaw, -360.0, 360.0, "deg")?;
         }
         let mut points = self.spawns.len();
         for (i, grid) in self.spawn_grids.iter().enumerate() {
             let key = Key::new("spawn_grids").index(i);
-            self.check_inside(&key.at("center"), grid.center)?;
+            self.check_car_inside(&key.at("center"), grid.center)?;
             key.at("yaw").number(grid.yaw, -360.0, 360.0, "deg")?;
             for axis in 0..2 {
                 key.at("count").index(axis).count(grid.count[axis], 1, THINGS_MAX, "points")?;
@@ -90,7 +100,7 @@ impl ArenaFile {
             for sign in [-0.5, 0.5] {
                 let half = |axis: usize| sign * (grid.count[axis] - 1) as f64 * grid.spacing[axis];
                 let [x, y, z] = grid.center;
-                self.check_inside(&key.at("corner"), [x + half(0), y, z + half(1)])?;
+                self.check_car_inside(&key.at("corner"), [x + half(0), y, z + half(1)])?;
             }
             points += grid.count[0] * grid.count[1];
             key.at("count").count(points, 1, THINGS_MAX, "spawn points in all")?;

@@ -1,8 +1,9 @@
 //! Meshes of an arena: files beside its own, read through the caller.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use pita_sim::collide::TriangleMesh;
 use pita_sim::geometry::Geometry;
 
 use super::{ArenaError, ArenaFile, Key};
@@ -19,28 +20,38 @@ impl ArenaFile {
         self.statics.iter().filter_map(|piece| piece.mesh.as_deref()).collect()
     }
 
-    /// Reads the meshes of statics. `read` answers the bytes of a file in the folder of the arena's file, or why not.
+    /// Reads the meshes of statics, each file once. `read` answers the bytes of a file in the folder of the arena's file, or why not.
     ///
     /// # Errors
     /// [`ArenaError`] naming the static, the file and what is wrong with it.
     pub fn read_meshes(&mut self, read: impl Fn(&str) -> Result<Vec<u8>, String>) -> Result<(), ArenaError> {
         let mut triangles = 0;
+        let mut known: BTreeMap<String, Arc<TriangleMesh>> = BTreeMap::new();
         for (i, piece) in self.statics.iter_mut().enumerate() {
             let copies = piece.block().count();
             let Some(name) = &piece.mesh else { continue };
             let key = Key::new("statics").index(i).at("mesh");
-            let bytes = match read(name) {
-                Ok(bytes) => bytes,
-                Err(reason) => return key.require(false, name, &format!("a readable file ({reason})")),
+            let surface = match known.get(name) {
+                Some(surface) => surface.clone(),
+                None => known.entry(name.clone()).or_insert(surface(&key, name, &read)?).clone(),
             };
-            let surface = Geometry::from_file(name, &bytes).and_then(|geometry| geometry.surface());
-            let surface = surface.map_err(|source| ArenaError::Engine { key: format!("{key}, {name}"), source })?;
             triangles += copies * surface.triangles().len();
             key.count(triangles, 1, TRIANGLES_MAX, "triangles, those of copies and earlier meshes included")?;
-            piece.surface = Some(Arc::new(surface));
+            piece.surface = Some(surface);
         }
         Ok(())
     }
+}
+
+/// The surface in the file `name`, which the static at `key` is made of.
+fn surface(
+    key: &Key,
+    name: &str,
+    read: impl Fn(&str) -> Result<Vec<u8>, String>,
+) -> Result<Arc<TriangleMesh>, ArenaError> {
+    let bytes = read(name).map_err(|reason| key.refuse(name, &format!("a readable file ({reason})")))?;
+    let surface = Geometry::from_file(name, &bytes).and_then(|geometry| geometry.surface());
+    surface.map(Arc::new).map_err(|source| ArenaError::Engine { key: format!("{key}, {name}"), source })
 }
 
 /// `Err` unless `name` leads to nowhere but the arena's folder and those below it.

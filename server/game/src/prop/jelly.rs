@@ -1,6 +1,6 @@
 //! A jelly: an elastic block in a lattice, which wobbles, and springs back when it is driven through.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use pita_sim::mass::{Density, Polyhedron};
 use pita_sim::potential::elasticity::Elastic;
@@ -38,6 +38,20 @@ pub struct JellyParameters {
     /// Young's modulus, Pa.
     #[serde(default = "stiffness")]
     pub stiffness: f64,
+    /// All copies have the same.
+    #[serde(skip)]
+    lattice: OnceLock<Arc<Lattice>>,
+}
+
+impl JellyParameters {
+    /// The block at rest, of which masses are computed once.
+    fn lattice(&self) -> Result<Arc<Lattice>, SimError> {
+        if let Some(lattice) = self.lattice.get() {
+            return Ok(lattice.clone());
+        }
+        let lattice = Arc::new(lattice_of(self)?);
+        Ok(self.lattice.get_or_init(|| lattice).clone())
+    }
 }
 
 fn size() -> [f64; 3] {
@@ -69,7 +83,7 @@ impl ActorKind for Jelly {
     type Parameters = JellyParameters;
 
     fn check(parameters: &JellyParameters, key: &Key, file: &ArenaFile) -> Result<(), ArenaError> {
-        let JellyParameters { material, size, cells, density, stiffness } = parameters;
+        let JellyParameters { material, size, cells, density, stiffness, .. } = parameters;
         file.check_material(&key.at("material"), material)?;
         for axis in 0..3 {
             key.at("size").index(axis).number(size[axis], 0.2, 20.0, "m")?;
@@ -80,7 +94,7 @@ impl ActorKind for Jelly {
     }
 
     fn add(site: &mut Site, parameters: &JellyParameters) -> Result<Self, SimError> {
-        let lattice = Arc::new(lattice_of(parameters)?);
+        let lattice = parameters.lattice()?;
         let hulls = hulls(&lattice, parameters, site.material(&parameters.material))?;
         let (q, v) = (lattice.placed(site.pose.position, site.pose.rotation()), lattice.still());
         let figure = FigureDesc { dof: lattice.clone(), q, v, colliders: Vec::new() };
@@ -159,5 +173,17 @@ impl Actor for Jelly {
     fn place(&mut self, world: &mut World, pose: Pose) -> Result<(), SimError> {
         let (q, v) = (self.lattice.placed(pose.position, pose.rotation()), self.lattice.still());
         world.set_slice(self.bodies[0], &q, &v)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn copies_share_what_is_computed_of_them_at_rest() {
+        let parameters: JellyParameters = toml::from_str("material = \"rubber\"").unwrap();
+        let [first, second] = [parameters.lattice().unwrap(), parameters.lattice().unwrap()];
+        assert!(Arc::ptr_eq(&first, &second));
     }
 }

@@ -144,6 +144,11 @@ impl VehicleParameters {
         self.wheel_radius - self.hub_height - self.static_sag()
     }
 
+    /// How far the centres of its bodies are from the ground point below it, while it rests: sideways and upwards, m.
+    pub fn reach(&self) -> [f64; 2] {
+        [0.5 * self.wheelbase.hypot(self.track), self.ride_height().max(self.wheel_radius)]
+    }
+
     /// Largest steering angle at a forward speed in m/s, rad: v² tan δ / wheelbase is the acceleration sideways.
     pub fn steer_limit(&self, speed: f64) -> f64 {
         let by_speed = (self.wheelbase * self.steering.acceleration / (speed * speed)).atan();

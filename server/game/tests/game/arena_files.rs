@@ -74,7 +74,7 @@ const BAD: &[(&str, &str, &[&str])] = &[
     (
         "[materials",
         "[bounds]\nmin = [-9, 0, -9]\nmax = [9, 9, 9]\n[materials",
-        &["spawn_grids[0].corner[0] is -28", "-9 to 9 m, the bounds"],
+        &["spawn_grids[0].corner[0] is -28", "-7.47", "a whole car is within the bounds"],
     ),
     (
         "[materials",
@@ -170,7 +170,27 @@ const BAD_ADDITIONS: &[(&str, &[&str])] = &[
     ("[vehicle.differential]\nfront = \"shut\"", &["unknown variant `shut`", "`limited`"]),
     ("[vehicle]\nwings = 2", &["unknown field `wings`"]),
     ("[vehicle]\ndrive = \"sails\"", &["unknown variant `sails`", "`rear`"]),
-    ("[[spawns]]\nposition = [0, nan, 0]", &["spawns[0].position[1] is NaN", "-20 to 1000 m"]),
+    ("[[spawns]]\nposition = [0, nan, 0]", &["spawns[0].position[1] is NaN", "a whole car"]),
+    (
+        "[[spawns]]\nposition = [0, 49.8, 0]\n[bounds]\nmin = [-99, -9, -99]\nmax = [99, 50, 99]",
+        &["spawns[0].position[1] is 49.8", "-9 to 49.", "a whole car is within the bounds"],
+    ),
+    (
+        "[[spawns]]\nposition = [98, 0, 0]\n[bounds]\nmin = [-99, -9, -99]\nmax = [99, 50, 99]",
+        &["spawns[0].position[0] is 98", "a whole car is within the bounds"],
+    ),
+    (
+        "[[spawns]]\nposition = [90, 3, 0]\n[[statics]]\nshape.box.half = [5, 0.1, 5]\nmaterial = \"asphalt\"\nposition = [90, 3.7, 0]",
+        &["spawns[0].position is [90, 3, 0]", "where a car has room"],
+    ),
+    (
+        "[[statics]]\nshape.box.half = [0.1, 5, 0.1]\nmaterial = \"asphalt\"\nposition = [-28, 0, -15]",
+        &["spawn_grids[0].point[1] is [-28, 0, -15]", "where a car has room"],
+    ),
+    (
+        "[[actors]]\nkind = \"jelly\"\nmaterial = \"asphalt\"\ncells = [6, 6, 6]\nposition = [0, 0, 0]\ncopies = [128, 1, 128]\nspacing = [9, 0, 9]",
+        &["actors[0]", "at most 65536 coordinates in all", "fewer copies"],
+    ),
     (
         "[[actors]]\nkind = \"prop\"\nshape.half_space = {}\nmaterial = \"asphalt\"\nmass = 1\nposition = [0, 0, 0]",
         &["actors[0].shape is half_space", "box, ball, capsule or cylinder"],
@@ -251,14 +271,24 @@ fn statics_may_be_meshes() {
         FLAT.replacen("[[statics]]", &format!("{piece}[[statics]]"), 1)
     };
     let square = "v -9 0 -9\nv 9 0 -9\nv -9 0 9\nv 9 0 9\nf 1 3 4 2\n";
+    let reads = std::cell::Cell::new(0);
     let read = |name: &str| match name {
-        "level/square.obj" => Ok(square.as_bytes().to_vec()),
+        "level/square.obj" => {
+            reads.set(reads.get() + 1);
+            Ok(square.as_bytes().to_vec())
+        }
         _ => Err("no such file".to_owned()),
     };
     let supplies = Supplies { kinds: &ActorKinds::none(), read: &read };
     let load = |mesh: &str| Arena::from_toml_with(&with(mesh), &SETTINGS, &supplies).map_err(|error| error.to_string());
     let arena = load("level/square.obj").expect("a good file");
     assert!(matches!(&arena.statics()[0].shape, Shape::Mesh(mesh) if mesh.triangles().len() == 2));
+    // However many statics are made of it, it is read once.
+    let (one, before) = (with("level/square.obj"), reads.get());
+    let piece = &one[one.find("[[statics]]").unwrap()..one.rfind("[[statics]]").unwrap()];
+    let many = one.replacen(piece, &piece.repeat(50), 1);
+    let arena = Arena::from_toml_with(&many, &SETTINGS, &supplies).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!((arena.statics().len(), reads.get() - before), (51, 1));
     for (mesh, expected) in [
         ("square.obj", "statics[0].mesh is square.obj, allowed: a readable file (no such file)"),
         ("../square.obj", "statics[0].mesh is ../square.obj, allowed: a path below"),

@@ -147,3 +147,11 @@ fn a_jelly_wobbles_and_springs_back() {
     assert!(world.frame(jelly, PartPoint { part: 0, point: DVec3::Y }).is_some());
     assert_eq!(world.report().quarantined, 0);
 }
+
+/// Who is not touched costs nothing.
+#[test]
+fn a_jelly_that_is_left_alone_falls_asleep() {
+    let mut track = with("jelly", "position = [30, 0, 40]\ncopies = [2, 1, 1]\nspacing = [5, 0, 0]");
+    run(&mut track, 6.0);
+    assert_eq!(track.arena.world().report().asleep, 2);
+}

@@ -17,9 +17,10 @@ speed = 15.0
 corners = [[60.0, 60.0], [-60.0, 60.0], [-60.0, -60.0], [60.0, -60.0]]
 "#;
 
-/// Flat ground, a driver in it, and `statics`.
+/// Flat ground, a driver in it, and `statics`, aside from where cars start.
 fn track(statics: &str) -> TestTrack {
-    TestTrack::new(&format!("{FLAT}\n{statics}\n{DRIVER}"), SETTINGS)
+    let ground = FLAT.replace("count = [8, 8]", "count = [8, 8]\ncenter = [0.0, 0.0, 150.0]");
+    TestTrack::new(&format!("{ground}\n{statics}\n{DRIVER}"), SETTINGS)
 }
 
 fn block(half: [f64; 3], position: [f64; 3]) -> String {

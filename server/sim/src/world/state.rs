@@ -61,7 +61,8 @@ impl World {
         self.bodies.get(id).is_some_and(|body| body.quarantined)
     }
 
-    /// Puts a body somewhere else; its contacts of the last tick are forgotten, and so is a quarantine.
+    /// Puts a body somewhere else; its contacts of the last tick are forgotten, and so are a quarantine and the forces and
+    /// torques that were asked for until now.
     ///
     /// # Errors
     /// [`SimError`] for a value out of range, or a body that is gone.
@@ -72,6 +73,7 @@ impl World {
         self.rouse(id);
         let body = &mut self.bodies[id];
         body.set_pose(Pose { position, rotation: rotation.normalize() }, &mut self.state);
+        body.forget_forces();
         body.quarantined = false;
         body.impulse = Twist::REST;
         self.forget_contacts(id);
@@ -197,8 +199,8 @@ impl World {
         Some(SliceView { serial: body.serial, kind: body.kind, blocks, q, v })
     }
 
-    /// Sets positions and rates of a body of a general kind; its contacts of the last tick are forgotten, and so is a
-    /// quarantine.
+    /// Sets positions and rates of a body of a general kind; its contacts of the last tick are forgotten, and so are a
+    /// quarantine and the forces that were asked for until now.
     ///
     /// # Errors
     /// [`SimError`] for a value out of range, numbers that are too many or too few, or a body that is gone.
@@ -216,6 +218,7 @@ impl World {
         }
         figure.dof.check(q, v)?;
         figure.change.fill(0.0);
+        figure.force.fill(0.0);
         body.quarantined = false;
         self.state.q_mut(body.slice).copy_from_slice(q);
         self.state.v_mut(body.slice).copy_from_slice(v);

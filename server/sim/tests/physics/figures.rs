@@ -75,6 +75,29 @@ fn rigid(world: &mut World, mass: f64, position: DVec3) -> BodyId {
     world.add_rigid_body(RigidBodyDesc::new(position, mass, inertia)).unwrap()
 }
 
+/// Who is put somewhere else starts there anew: what was to push it where it was does not push it there.
+#[test]
+fn what_is_put_elsewhere_forgets_what_was_to_push_it() {
+    let mut world = weightless();
+    let (solid, figure) = (rigid(&mut world, 2.0, DVec3::X), add(&mut world, natural()));
+    let still = world.slice(figure).map(|slice| (slice.q.to_vec(), vec![0.0; slice.v.len()])).unwrap();
+    let (pushed, kept) = (PartPoint { part: 0, point: DVec3::ZERO }, DVec3::Z * 6.0);
+    for body in [solid, figure] {
+        world.apply_force_at(body, pushed, DVec3::X * 1e4).unwrap();
+    }
+    world.apply_torque(solid, DVec3::X * 1e4).unwrap();
+    world.set_pose(solid, DVec3::X * 5.0, DQuat::IDENTITY).unwrap();
+    world.set_velocity(solid, DVec3::ZERO, DVec3::ZERO).unwrap();
+    world.set_slice(figure, &still.0, &still.1).unwrap();
+    // What is asked for afterwards counts.
+    world.apply_force(solid, kept, DVec3::X * 5.0).unwrap();
+    world.step();
+    let expected = kept * DT / 2.0;
+    assert!((world.velocity(solid).unwrap() - expected).length() < 1e-9, "{:?}", world.velocity(solid));
+    assert!(world.angular_velocity(solid).unwrap().length() < 1e-9);
+    assert!(world.slice(figure).unwrap().v.iter().all(|v| v.abs() < 1e-6), "{:?}", world.slice(figure));
+}
+
 /// A force gives its impulse, and its moment as far as nothing moves within the tick, whatever it acts on; and it is for
 /// one tick.
 #[test]
