@@ -251,7 +251,11 @@ impl<const D: usize> Visitor for Assemble<'_, D> {
         let blocks = self.matrix.diagonal.len();
         for term in terms {
             let slot = self.slots.next().copied().unwrap_or(NONE);
-            let hessian = term.hessian(self.dt, pair(self.frames, term));
+            let at = pair(self.frames, term);
+            if term.is_idle(self.dt, at) {
+                continue;
+            }
+            let hessian = term.hessian(self.dt, at);
             let frames = term.frames();
             for (end, &frame) in frames.iter().enumerate().filter(|&(_, &frame)| frame != FIXED) {
                 match self.matrix.diagonal.get_mut(frame as usize) {

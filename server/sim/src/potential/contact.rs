@@ -434,6 +434,11 @@ impl Term for ContactTerm {
         self.pushes(displacement, normal)
     }
 
+    fn is_idle(&self, dt: f64, at: [&Frame<f64>; 2]) -> bool {
+        self.limit <= 0.0 && self.depth(self.displacement(dt, at)) <= 0.0
+    }
+
+    #[inline(always)]
     fn hessian(&self, dt: f64, at: [&Frame<f64>; 2]) -> PairBlocks {
         let displacement = self.displacement(dt, at);
         let nn = outer(self.normal, self.normal);
@@ -487,5 +492,41 @@ mod tests {
                 assert!(((above.1 - below.1) / (2.0 * h) - slope(x)).abs() < 1e-5, "slope at {x}");
             }
         }
+    }
+
+    /// What is idle has no Hessian, and what bears a load is not idle, whichever way it moves.
+    #[test]
+    fn only_what_is_open_is_idle() {
+        let (dt, frame) = (1.0 / 30.0, |speed: f64| Frame { linear: (DVec3::Y * speed).into(), ..Frame::WORLD });
+        let (mut idle, mut loaded) = (0, 0);
+        for speed in (-20..20).map(|i| f64::from(i) * 0.01) {
+            let mut term = ContactTerm {
+                frames: [0, FIXED],
+                arms: [DVec3::ZERO; 2],
+                normal: DVec3::NEG_Y,
+                start_gap: 1e-3,
+                excess_depth: 0.0,
+                loaded_gap: 0.0,
+                stiffening: 1.0,
+                most_stiffening: 1.0,
+                tolerance: 1e-3,
+                normal_stiffness: 1e5,
+                tangent_stiffness: 1e5,
+                transition: 1e-3,
+                friction: 0.5,
+                anchor: DVec3::ZERO,
+                limit: 0.0,
+                is_impact: false,
+                owed: 0.0,
+                start_speed: 0.0,
+                last_force: 0.0,
+            };
+            let at = [&frame(speed), &Frame::WORLD];
+            term.relinearise(dt, at);
+            let largest = term.hessian(dt, at).own::<6>(0).as_flattened().iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            assert_eq!(term.is_idle(dt, at), largest == 0.0, "{speed}");
+            *if largest == 0.0 { &mut idle } else { &mut loaded } += 1;
+        }
+        assert!(idle > 10 && loaded > 10, "{idle} {loaded}");
     }
 }

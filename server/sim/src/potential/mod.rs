@@ -274,6 +274,11 @@ pub(crate) trait Term {
     /// Positive semidefinite Hessian at the candidate.
     fn hessian(&self, dt: f64, at: [&Frame<f64>; 2]) -> PairBlocks;
 
+    /// Whether its Hessian at the candidate is zero, where that is cheaply told.
+    fn is_idle(&self, _dt: f64, _at: [&Frame<f64>; 2]) -> bool {
+        false
+    }
+
     /// Takes what is held fixed during a Newton iteration from the candidate at its start.
     fn relinearise(&mut self, _dt: f64, _at: [&Frame<f64>; 2]) {}
 
@@ -322,7 +327,7 @@ impl PairBlocks {
     }
 
     /// Second derivative by the displacement of one frame, 0 is a, 1 is b: all of it with R = 6, that of places with 3.
-    #[inline]
+    #[inline(always)]
     pub fn own<const R: usize>(&self, end: usize) -> Block<R> {
         if R <= 3 {
             return quarter(&self.points, 1.0);
@@ -333,7 +338,7 @@ impl PairBlocks {
     }
 
     /// Second derivative by the displacements of a, rows, and b, columns; R as in [`PairBlocks::own`].
-    #[inline]
+    #[inline(always)]
     pub fn between<const R: usize>(&self) -> Block<R> {
         if R <= 3 {
             return quarter(&self.points, -1.0);
@@ -364,10 +369,18 @@ fn quarter<const R: usize>(k: &DMat3, factor: f64) -> Block<R> {
 }
 
 /// A block out of its quarters: translation by translation, translation by rotation, and so on.
-#[inline]
+// Number by number: a matrix that is copied as a whole right after it was made waits for its numbers to arrive in memory.
+#[inline(always)]
 fn block<const R: usize>(ll: DMat3, la: DMat3, al: DMat3, aa: DMat3) -> Block<R> {
-    let quarters = [[ll, la], [al, aa]].map(|row| row.map(|quarter| quarter.to_cols_array_2d()));
-    std::array::from_fn(|i| std::array::from_fn(|j| quarters[i / 3][j / 3][j % 3][i % 3]))
+    let mut block = [[0.0; R]; R];
+    for (quarter, row, column) in [(ll, 0, 0), (la, 0, 3), (al, 3, 0), (aa, 3, 3)] {
+        for (j, axis) in [quarter.x_axis, quarter.y_axis, quarter.z_axis].into_iter().enumerate() {
+            for (i, number) in [axis.x, axis.y, axis.z].into_iter().enumerate() {
+                block[row + i][column + j] = number;
+            }
+        }
+    }
+    block
 }
 
 /// Positive part of the geometric stiffness of a gradient `force` that acts at `arm`, with respect to turns of the body.
