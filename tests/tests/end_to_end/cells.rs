@@ -11,9 +11,10 @@ use pita_protocol::{decode, encode};
 use pita_tests::observer::{self, Observer};
 use pita_tests::relay::Relay;
 use pita_tests::server_process::ServerProcess;
+use zenoh::handlers::RingChannel;
 
 use crate::clients::{connect, next_snapshot};
-use crate::{SOON, observed, pita_server};
+use crate::{LONG, SOON, observed, pita_server};
 
 /// Flat ground with spawn points far from each other, and crates in three places.
 const FIELD: &str = r#"
@@ -104,7 +105,8 @@ impl Looker {
     async fn look(endpoint: &str, observer: &Observer, cell: CellId, enough: impl Fn(&Self) -> bool) -> Self {
         let session = observer::open(endpoint).await.unwrap();
         let key = format!("pita/{}/cell/{}/{}/*", observer.keys().arena(), cell.x, cell.z);
-        let messages = session.declare_subscriber(key).await.unwrap();
+        // A full channel of the other kind holds up the thread that answers come by.
+        let messages = session.declare_subscriber(key).with(RingChannel::new(1024)).await.unwrap();
         let mut looker = Self { decoder: CellDecoder::default(), bodies: BTreeMap::new() };
         looker.fetch(&session, observer, cell).await;
         let until = Instant::now() + SOON;
@@ -118,6 +120,8 @@ impl Looker {
                 Err(_) => looker.fetch(&session, observer, cell).await,
             }
         }
+        drop(messages);
+        session.close().await.unwrap();
         looker
     }
 
@@ -144,10 +148,13 @@ async fn who_looks_where_gets_what_is_there_and_newcomers_begin_at_the_keyframe(
     let of_crates =
         |looker: &Looker| -> BTreeSet<u32> { looker.bodies.keys().copied().filter(|id| crates.contains(id)).collect() };
     let two = |looker: &Looker| of_crates(looker).len() == 2;
-    let (west, east) = tokio::join!(
-        Looker::look(&server.endpoint, &observer, WEST, two),
-        Looker::look(&server.endpoint, &observer, EAST, two),
-    );
+    let looking = async {
+        tokio::join!(
+            Looker::look(&server.endpoint, &observer, WEST, two),
+            Looker::look(&server.endpoint, &observer, EAST, two),
+        )
+    };
+    let (west, east) = tokio::time::timeout(LONG, looking).await.expect("both see their crates");
     let (west, east) = (of_crates(&west), of_crates(&east));
     assert!(west.is_disjoint(&east), "{west:?} {east:?}");
     assert_eq!(&west | &east, crates);
@@ -169,7 +176,7 @@ async fn over_datagrams_cells_come_along_with_the_own_snapshots() {
     let port: String = said.split(DATAGRAMS).nth(1).unwrap().chars().take_while(char::is_ascii_digit).collect();
     // What is put on the slot's key, seen from outside.
     let listener = observer::open(&server.endpoint).await.unwrap();
-    let messages = listener.declare_subscriber(observer.keys().snapshot(0)).await.unwrap();
+    let messages = listener.declare_subscriber(observer.keys().snapshot(0)).with(RingChannel::new(64)).await.unwrap();
     let player = Session::builder(&server.endpoint, "player").datagrams(&format!("{DATAGRAMS}{port}"));
     let player = player.connect().await.unwrap();
     see_all(&player, &crates(&player)).await;
@@ -256,7 +263,7 @@ async fn a_slow_client_gets_less_and_a_frozen_one_nothing_and_the_others_everyth
     let greedy_line = Relay::start(&server.endpoint, 10_000_000).await.unwrap();
     let greedy = observer::open(&greedy_line.endpoint).await.unwrap();
     let all_cells = format!("pita/{}/cell/**", observer.keys().arena());
-    let _unread = greedy.declare_subscriber(all_cells).await.unwrap();
+    let _unread = greedy.declare_subscriber(all_cells).with(RingChannel::new(8)).await.unwrap();
     greedy_line.set_rate(GREEDY_BYTES_PER_S);
     slow_line.set_rate(SLOW_BYTES_PER_S);
     let began = Instant::now();
