@@ -8,6 +8,7 @@ mod within;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use pita_game::arena_file::PrecisionFile;
 use pita_protocol::dof::{Cadence, Precision, STEPS_MAX};
 use serde::Deserialize;
 
@@ -113,7 +114,18 @@ pub struct PrecisionSteps {
     pub joint_steps: Within<10, 65_536>,
 }
 
+/// Arena files are checked without the wire.
+const _: () = assert!(pita_game::arena_file::STEPS_MAX as i32 == STEPS_MAX);
+
 impl PrecisionSteps {
+    /// The precision of an arena whose file wants `own`, which goes first.
+    pub fn of_arena(self, own: PrecisionFile) -> Precision {
+        let default = Precision::from(self);
+        let PrecisionFile { steps_per_m, rotation_steps, joint_steps } = own;
+        let (point, rotation) = (steps_per_m.unwrap_or(default.point), rotation_steps.unwrap_or(default.rotation));
+        Precision { point, rotation, scalar: joint_steps.unwrap_or(default.scalar), ..default }
+    }
+
     /// Checks that the steps of positions cover an arena whose bodies come as far as `reach_m` from the origin.
     ///
     /// # Errors
@@ -332,6 +344,16 @@ mod tests {
         for word in ["my.toml", "precision.steps_per_m", "20000", "5000 m", "10 to 13421"] {
             assert!(said.contains(word), "{said:?} lacks {word:?}");
         }
+    }
+
+    #[test]
+    fn an_arena_s_own_precision_goes_first() {
+        let config = ServerConfig::parse("[precision]\nsteps_per_m = 700\njoint_steps = 800", "my.toml").unwrap();
+        let own = PrecisionFile { steps_per_m: Some(2000), rotation_steps: Some(4000), joint_steps: None };
+        let expected = Precision { point: 2000, rotation: 4000, scalar: 800, ..Precision::default() };
+        assert_eq!(config.precision.of_arena(own), expected);
+        let expected = Precision { point: 700, scalar: 800, ..Precision::default() };
+        assert_eq!(config.precision.of_arena(PrecisionFile::default()), expected);
     }
 
     #[test]

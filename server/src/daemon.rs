@@ -123,7 +123,10 @@ fn configure(args: &RunArgs) -> Result<Configured, DaemonError> {
     let text = ArenaText::find(&config.arena.source, &config.arena.parameters)?;
     let arena = text.build(&settings)?;
     let file = args.config.as_ref().map_or(BUILT_IN.to_owned(), |file| file.display().to_string());
-    config.precision.check_reach(arena.reach_m(), &file)?;
+    // The arena's own steps were checked with its file.
+    if arena.precision().steps_per_m.is_none() {
+        config.precision.check_reach(arena.reach_m(), &file)?;
+    }
     let secret_file = Some(&config.admin.secret_file).filter(|file| !file.as_os_str().is_empty());
     let secret = secret_file.map(|file| admin::read_secret(file)).transpose()?;
     let doorkeeper = Doorkeeper::new(secret, admin::new_tag_key()?);
@@ -160,7 +163,7 @@ fn run_arena(configured: Configured, clock: Clock, out: &Output) -> Result<(), D
 fn share(config: &ServerConfig, arena: &Arena, source: ArenaSource, clock: Clock) -> Result<Shared, DaemonError> {
     let name_error = |reason| DaemonError::ArenaName { name: arena.name().to_owned(), reason };
     let limits = config.sessions;
-    let description = description::describe(arena, config.precision.into());
+    let description = description::describe(arena, config.precision.of_arena(arena.precision()));
     description::check(&description).map_err(DaemonError::Undescribable)?;
     frame::check(arena.world()).map_err(DaemonError::Undescribable)?;
     // Ranges of the configuration are within u16.

@@ -20,7 +20,7 @@ use pita_sim::{BodyId, Collision, Shape, World};
 
 use crate::Controls;
 use crate::actor::{Actor, ActorInfo};
-use crate::arena_file::{BoundsFile, Materials};
+use crate::arena_file::{BoundsFile, Materials, PrecisionFile};
 use crate::combat::CombatParameters;
 use crate::pipeline::Ports;
 use crate::spawn::Pose;
@@ -142,6 +142,7 @@ pub struct Arena {
     statics: Vec<StaticInfo>,
     /// What leaves it is put back.
     bounds: BoundsFile,
+    precision: PrecisionFile,
     materials: Materials,
     vehicle: VehicleParameters,
     /// `None` where nobody fights.
@@ -244,7 +245,12 @@ impl Arena {
 
     /// The largest coordinate, in size, that bodies have before they are put back, m.
     pub fn reach_m(&self) -> f64 {
-        self.bounds.min.iter().chain(&self.bounds.max).fold(0.0, |reach, x| f64::max(reach, x.abs()))
+        self.bounds.reach_m()
+    }
+
+    /// How fine the arena's file wants its state to be sent.
+    pub fn precision(&self) -> PrecisionFile {
+        self.precision
     }
 
     /// What happened in the last tick, in order, and what was added since.

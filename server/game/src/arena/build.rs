@@ -67,6 +67,7 @@ impl Arena {
             world,
             statics: Vec::with_capacity(file.statics.len()),
             bounds: file.bounds,
+            precision: file.precision,
             materials: Materials::new(&file.materials),
             owners: BTreeMap::new(),
             collisions: Vec::new(),

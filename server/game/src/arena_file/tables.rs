@@ -9,7 +9,8 @@ use serde::Deserialize;
 
 use super::block::Block;
 use super::{
-    AiFile, Angles, DriverFile, MaterialFile, MaterialPairFile, ParameterFile, ShapeFile, SleepFile, SolverFile,
+    AiFile, Angles, DriverFile, MaterialFile, MaterialPairFile, ParameterFile, PrecisionFile, ShapeFile, SleepFile,
+    SolverFile,
 };
 use crate::combat::CombatParameters;
 use crate::vehicle::VehicleParameters;
@@ -39,6 +40,9 @@ pub struct ArenaFile {
     /// Box of the world.
     #[serde(default)]
     pub bounds: BoundsFile,
+    /// How fine the state is sent.
+    #[serde(default)]
+    pub precision: PrecisionFile,
     /// Surfaces, by name.
     pub materials: BTreeMap<String, MaterialFile>,
     /// Pairs of surfaces whose contacts are not as the rule says.
@@ -83,6 +87,13 @@ pub struct BoundsFile {
     pub min: [f64; 3],
     /// Greatest x, y, z, m.
     pub max: [f64; 3],
+}
+
+impl BoundsFile {
+    /// The largest coordinate, in size, m.
+    pub fn reach_m(&self) -> f64 {
+        self.min.iter().chain(&self.max).fold(0.0, |reach, x| f64::max(reach, x.abs()))
+    }
 }
 
 impl Default for BoundsFile {

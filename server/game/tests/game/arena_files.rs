@@ -1,6 +1,6 @@
 //! Arena files, good and bad.
 
-use pita_game::arena_file::{ArenaFile, with_parameters};
+use pita_game::arena_file::{ArenaFile, PrecisionFile, with_parameters};
 use pita_game::vehicle::VehicleParameters;
 use pita_game::{ActorKinds, Arena, ArenaError, Supplies};
 use pita_sim::{Method, Shape, SolverSettings};
@@ -46,6 +46,22 @@ fn arenas_choose_when_things_sleep() {
 }
 
 #[test]
+fn arenas_choose_how_fine_they_are_sent() {
+    let with =
+        |tables: &str| Arena::from_toml(&FLAT.replacen("[materials", &format!("{tables}\n[materials"), 1), &SETTINGS);
+    let small = "[bounds]\nmin = [-200, -20, -200]\nmax = [200, 100, 1000]";
+    let precision =
+        with(&format!("{small}\n[precision]\nsteps_per_m = 20000\njoint_steps = 500")).map(|a| a.precision());
+    let expected = PrecisionFile { steps_per_m: Some(20_000), rotation_steps: None, joint_steps: Some(500) };
+    assert_eq!(precision, Ok(expected));
+    assert_eq!(with("").map(|arena| arena.precision()), Ok(PrecisionFile::default()));
+    // The bounds are 5 km without the table: 2^26 steps are less.
+    let Err(error) = with("[precision]\nsteps_per_m = 20000") else { panic!("accepted") };
+    let allowed = "allowed: 10 to 13421 steps a metre, for bounds 5000 m from the origin";
+    assert_eq!(error.to_string(), format!("precision.steps_per_m is 20000, {allowed}"));
+}
+
+#[test]
 fn parameters_are_chosen_by_who_runs_the_arena() {
     let text = FLAT.replace("count = [8, 8]", "count = [\"$rows\", 2]");
     let text = format!("{text}\n[parameters.rows]\ndefault = 3\nmin = 1\nmax = 5\n");
@@ -76,6 +92,10 @@ const BAD: &[(&str, &str, &[&str])] = &[
         "[bounds]\nmin = [-9, 0, -9]\nmax = [9, 9, 9]\n[materials",
         &["spawn_grids[0].corner[0] is -28", "-7.47", "a whole car is within the bounds"],
     ),
+    ("[materials", "[precision]\nsteps_per_m = 9\n[materials", &["precision.steps_per_m is 9", "10 to 13421"]),
+    ("[materials", "[precision]\nrotation_steps = 9000\n[materials", &["rotation_steps is 9000", "64 to 8192 steps"]),
+    ("[materials", "[precision]\njoint_steps = 70000\n[materials", &["joint_steps is 70000", "10 to 65536"]),
+    ("[materials", "[precision]\nrate = 1\n[materials", &["unknown field `rate`", "steps_per_m"]),
     (
         "[materials",
         "[solver]\nmethod = \"newtn\"\n[materials",
