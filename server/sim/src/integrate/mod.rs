@@ -74,8 +74,8 @@ pub struct StepReport {
     pub asleep: usize,
     /// Bodies that were quarantined in this tick because their state became non-finite.
     pub quarantined: usize,
-    /// Work that forces, axles, motors and controllers did on bodies in this tick, J; 0 unless
-    /// [audited](crate::Settings::audit_energy).
+    /// Work that forces, axles, motors and controllers did on bodies in this tick, and recovery, which moves what overlaps
+    /// apart, and what restitution gave back, J; 0 unless [audited](crate::Settings::audit_energy).
     pub work_put_in: f64,
     /// By how much more than that the energy of the world rose in the integration, J; below 0 where it was dissipated. 0
     /// unless audited.
@@ -85,8 +85,7 @@ pub struct StepReport {
 }
 
 /// Energy that a tick may gain without being a burst: a share of the energy of motion, and so much in any case, J. A tick
-/// gains nothing but what lifts overlaps apart, at up to 1 kJ a tick for a car: one that is not solved has to pay for its
-/// motion (`energy_bound`). An explosion of the numbers is many times more.
+/// that is not solved has to pay for its motion (`energy_bound`). An explosion of the numbers is many times more.
 const BURST: (f64, f64) = (1e-2, 100.0);
 
 impl StepReport {

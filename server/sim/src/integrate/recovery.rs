@@ -5,7 +5,12 @@
 //! that momentum is that of a tick without recovery. Only islands with a deep contact pay for it.
 
 use super::StepReport;
+use super::gather::Active;
 use super::step::{Integrator, Scene, Solve, finite_or_zero};
+use crate::dof::{Body, motion};
+use crate::potential::contact::ContactTerm;
+use crate::settings::Settings;
+use crate::state::State;
 use glam::DVec3;
 
 impl Integrator {
@@ -25,6 +30,9 @@ impl Integrator {
                 if body.quarantined {
                     continue;
                 }
+                if scene.settings.audit_energy {
+                    report.work_put_in += solve.work_of_recovery(&active, body, scene.state, scene.settings);
+                }
                 if let Some(figure) = solve.problem.figures.list().get(active.figure as usize) {
                     body.set_figure_rates(&figure.v1, scene.state);
                 } else if let Some(node) = solve.node(active.start) {
@@ -42,13 +50,26 @@ impl Solve {
     /// another start is nearer. Answers whether one is wanted.
     fn start_over_without_recovery(&mut self, scene: &Scene) -> bool {
         let contacts = &mut self.problem.terms.contacts;
-        // Those after the first look's deepened in this tick, at speeds that bodies have.
-        let is_deep = contacts.iter().take(self.contacts.len()).any(|contact| contact.recovers());
+        let is_deep = contacts.iter().any(ContactTerm::recovers);
         if is_deep {
             contacts.iter_mut().for_each(|contact| contact.stop_recovery());
             (self.is_pending, self.problem.is_parting) = (true, true);
         }
         is_deep && scene.settings.contact.recovery_speed > 0.0
+    }
+
+    /// By how much more energy the body has where recovery put it than where the second solution would, J.
+    fn work_of_recovery(&self, active: &Active, body: &Body, state: &State, settings: &Settings) -> f64 {
+        let q = state.q(body.slice);
+        let lift = |moment: DVec3| settings.field().energy(body.motion(state).moment - moment);
+        if let (Some(own), Some(figure)) = (&body.figure, self.problem.figures.list().get(active.figure as usize)) {
+            let stored = |q: &[f64]| own.stored_energy(q, &figure.v1, settings.dt);
+            lift(motion(&*own.dof, &figure.q1, &figure.v1).moment) + stored(q) - stored(&figure.q1)
+        } else if self.node(active.start).is_some() {
+            lift(body.mass * self.problem.frames[active.start as usize].pose().position)
+        } else {
+            0.0
+        }
     }
 
     /// Contacts remember the forces of the second solution.

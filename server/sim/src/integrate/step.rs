@@ -181,7 +181,7 @@ impl Integrator {
         for solve in &self.solves[..self.islands.len()] {
             solve.write_back(scene, &mut report);
             if scene.settings.audit_energy {
-                report.work_put_in += solve.problem.work_put_in();
+                report.work_put_in += solve.problem.work_put_in() + solve.problem.rebound_work();
             }
         }
         report

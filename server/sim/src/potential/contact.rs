@@ -80,6 +80,8 @@ pub(crate) struct ContactTerm {
     excess_depth: f64,
     /// Start gap of a tick without recovery: as deep as the load explains, m.
     loaded_gap: f64,
+    /// It takes back a depth that its load does not explain.
+    recovers: bool,
     /// How much stiffer than the settings' it is for its load.
     stiffening: f64,
     /// Most that this may become.
@@ -101,6 +103,8 @@ pub(crate) struct ContactTerm {
     is_impact: bool,
     /// [`Blow::owed`] if its bodies meet in this tick.
     owed: f64,
+    /// Its bodies are to part at a speed in this tick.
+    rebounds: bool,
     /// Speed at which it closed at the start of the tick, m/s.
     start_speed: f64,
     /// Normal force at the end of the last tick, N.
@@ -189,6 +193,7 @@ impl ContactTerm {
             start_gap,
             excess_depth: start_gap - point.gap,
             loaded_gap,
+            recovers: loaded_gap - start_gap > RECOVERY_SLOP,
             stiffening,
             most_stiffening,
             tolerance: settings.gap_tolerance,
@@ -200,6 +205,7 @@ impl ContactTerm {
             limit: point.surface.friction * point.normal_force,
             is_impact: overlap > settings.transition || (closes && point.normal_force == 0.0),
             owed,
+            rebounds: parting_speed.is_some(),
             start_speed: approach.now,
             last_force: point.normal_force,
         }
@@ -225,6 +231,7 @@ impl ContactTerm {
             start_gap: start_gap + start_depth,
             excess_depth: *start_depth,
             loaded_gap: (start_gap + start_depth).max(0.0),
+            recovers: false,
             stiffening: 1.0,
             most_stiffening: 1.0,
             tolerance: settings.gap_tolerance,
@@ -236,6 +243,7 @@ impl ContactTerm {
             limit: 0.0,
             is_impact: true,
             owed: 0.0,
+            rebounds: false,
             start_speed: 0.0,
             last_force: 0.0,
         }
@@ -298,6 +306,16 @@ impl ContactTerm {
         self.normal_stiffness * normal_spline(self.depth(self.displacement(dt, at)), self.transition).1
     }
 
+    /// What it gives back of the work that it took up when its bodies met, J.
+    pub fn rebound_work(&self, dt: f64, at: [&Frame<f64>; 2]) -> f64 {
+        if !self.rebounds {
+            return 0.0;
+        }
+        let displacement = self.displacement(dt, at);
+        let force = self.normal_stiffness * normal_spline(self.depth(displacement), self.transition).1;
+        force * displacement.along(self.normal).max(0.0)
+    }
+
     /// Depth at the candidate state, m; negative where it is open.
     pub fn final_depth(&self, dt: f64, at: [&Frame<f64>; 2]) -> f64 {
         self.depth(self.displacement(dt, at)) + self.excess_depth
@@ -305,13 +323,14 @@ impl ContactTerm {
 
     /// Whether it takes back a depth that its load does not explain. What [`ContactTerm::second`] takes back is the tick's.
     pub fn recovers(&self) -> bool {
-        self.loaded_gap - self.start_gap > RECOVERY_SLOP
+        self.recovers
     }
 
     /// From now on it is that of a tick in which its bodies are as deep as the load explains.
     pub fn stop_recovery(&mut self) {
         self.excess_depth += self.loaded_gap - self.start_gap;
         self.start_gap = self.loaded_gap;
+        self.recovers = false;
     }
 
     /// What comes of it at the end of the tick.
