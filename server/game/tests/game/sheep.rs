@@ -109,7 +109,7 @@ fn sheep_flee_a_car() {
 fn a_sheep_that_is_run_over_gets_up() {
     for form in FORMS {
         let keys = format!("{form}\nfear_radius = 0.0");
-        let mut track = TestTrack::new(&format!("{ROAD}{}", flock(1, [12.0, 0.0], &keys)), SETTINGS);
+        let mut track = TestTrack::new(&format!("{ROAD}{}", flock(1, [10.5, 0.0], &keys)), SETTINGS);
         track.enter(0);
         let (mut fastest, mut least, mut car) = (0.0f64, 1.0f64, 0.0f64);
         for tick in 0..30 * 14 {

@@ -142,6 +142,9 @@ pub(crate) struct ContactPoint {
     pub anchor: DVec3,
     /// At the end of the last tick that had this point, N.
     pub normal_force: f64,
+    /// What it bears, N: the least normal force of the last two ticks that were solved. A blow is no load, nor is the force
+    /// of a depth that the solver left.
+    pub load: f64,
     /// How much stiffer than the settings' the last tick found that it must be for its load; 0 where nothing is known.
     pub stiffening: f64,
     /// Turn of `b` against `a` that rolling and spinning resistance remember, rad.
@@ -165,7 +168,7 @@ impl ContactPoint {
     fn fresh((a, b): Key, normal: DVec3, point: &ManifoldPoint, surface: Surface) -> Self {
         let ManifoldPoint { position, gap, feature } = *point;
         let (anchor, turn, blow, believed_gap) = (DVec3::ZERO, DVec3::ZERO, Blow::default(), gap);
-        let (normal_force, stiffening, is_cancelled) = (0.0, 0.0, false);
+        let (normal_force, load, stiffening, is_cancelled) = (0.0, 0.0, 0.0, false);
         Self {
             a,
             b,
@@ -175,6 +178,7 @@ impl ContactPoint {
             surface,
             anchor,
             normal_force,
+            load,
             stiffening,
             turn,
             blow,
@@ -187,7 +191,7 @@ impl ContactPoint {
     /// Takes over what `old`, the same point in the last tick, remembers; stiffening is the pair's.
     fn inherit(&mut self, old: &Self) {
         self.anchor = old.anchor - self.normal * self.normal.dot(old.anchor);
-        (self.normal_force, self.turn, self.blow) = (old.normal_force, old.turn, old.blow);
+        (self.normal_force, self.load, self.turn, self.blow) = (old.normal_force, old.load, old.turn, old.blow);
     }
 
     /// A new point without a history between bodies that do not matter.
@@ -290,8 +294,8 @@ impl Detector {
         let of_pair = |contact: &ContactPoint| (contact.a, contact.b);
         let start = self.contacts.partition_point(|contact| of_pair(contact) < touch.key);
         for contact in self.contacts[start..].iter_mut().take_while(|contact| of_pair(contact) == touch.key) {
-            let (anchor, normal_force, blow) = (DVec3::ZERO, 0.0, Blow::default());
-            *contact = ContactPoint { is_cancelled: true, anchor, normal_force, turn: anchor, blow, ..*contact };
+            let (anchor, normal_force, load, blow) = (DVec3::ZERO, 0.0, 0.0, Blow::default());
+            *contact = ContactPoint { is_cancelled: true, anchor, normal_force, load, turn: anchor, blow, ..*contact };
         }
         true
     }

@@ -325,8 +325,8 @@ impl Body {
     }
 
     /// Writes the rates of a figure at the end of a tick, that has been moved already.
-    pub fn set_figure_rates(&self, v1: &[f64], state: &mut State) {
-        state.v_mut(self.slice).copy_from_slice(v1);
+    pub fn set_figure_rates(&self, v1: impl Iterator<Item = f64>, state: &mut State) {
+        state.v_mut(self.slice).iter_mut().zip(v1).for_each(|(rate, v1)| *rate = v1);
     }
 
     /// Writes the state of a figure at the end of a tick.

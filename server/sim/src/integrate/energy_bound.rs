@@ -22,6 +22,16 @@ struct Account {
 }
 
 impl Problem {
+    /// Energy of motion at the candidate, J.
+    pub(super) fn kinetic_energy(&self) -> f64 {
+        let bodies = self.unknowns.iter().zip(&self.frames).map(|(unknown, frame)| match unknown {
+            Unknown::Body(node) => kinetic(node, frame.twist()),
+            Unknown::Rates(_) => 0.0,
+        });
+        let figures = self.figures.list().iter().map(|figure| motion(&*figure.dof, &figure.q1, &figure.v1).energy);
+        bodies.sum::<f64>() + figures.sum::<f64>()
+    }
+
     /// The share of the candidate's rates that its energy lets it keep, from 0 to 1. Figures were evaluated there.
     pub(super) fn affordable_share(&self) -> f64 {
         if self.terms.contacts.iter().any(ContactTerm::recovers) {
@@ -46,14 +56,16 @@ impl Problem {
     }
 }
 
+/// Energy of a body that moves with a twist, J.
+fn kinetic(node: &Node, Twist { linear, angular }: Twist) -> f64 {
+    0.5 * (node.mass * linear.length_squared() + angular.dot(node.inertia * angular))
+}
+
 impl Account {
     fn add_body(&mut self, node: &Node, twist: Twist) {
-        let energy = |linear: glam::DVec3, angular: glam::DVec3| {
-            0.5 * (node.mass * linear.length_squared() + angular.dot(node.inertia * angular))
-        };
         // What turns without torque keeps its energy, not its angular velocity.
-        self.before += energy(node.before.linear, node.target.angular);
-        self.now += energy(twist.linear, twist.angular);
+        self.before += kinetic(node, Twist { angular: node.target.angular, ..node.before });
+        self.now += kinetic(node, twist);
         self.work += node.mass * (node.target.linear - node.before.linear).dot(twist.linear);
     }
 

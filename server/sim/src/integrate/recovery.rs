@@ -2,12 +2,13 @@
 //!
 //! A contact that starts out deep is solved twice. The first solution, with the depth taken back at a bounded speed, moves
 //! Q. The second is that of the same tick with the bodies just touching; it is what Q' and the contacts' forces become, so
-//! that momentum is that of a tick without recovery. Only islands with a deep contact pay for it.
+//! that momentum is that of a tick without recovery. It keeps no more energy of motion than the first one: what is wedged in
+//! stands still, though a tick in which it just touched would let it go. Only islands with a deep contact pay for it.
 
 use super::StepReport;
 use super::gather::Active;
 use super::step::{Integrator, Scene, Solve, finite_or_zero};
-use crate::dof::{Body, motion};
+use crate::dof::{Body, Twist, motion};
 use crate::potential::contact::ContactTerm;
 use crate::settings::Settings;
 use crate::state::State;
@@ -19,11 +20,10 @@ impl Integrator {
         let count = self.islands.len();
         for island in 0..count {
             let solve = &mut self.solves[island];
-            if !solve.start_over_without_recovery(scene) {
-                continue;
-            }
+            let Some(first_energy) = solve.start_over_without_recovery(scene) else { continue };
             self.workspace.solve(solve, &scene.settings.solver);
             solve.report.add_to(report);
+            let share = (first_energy / solve.problem.kinetic_energy()).sqrt().min(1.0);
             for &member in self.islands.members(island) {
                 let active = self.active[member as usize];
                 let body = &mut scene.bodies[active.id];
@@ -34,10 +34,10 @@ impl Integrator {
                     report.work_put_in += solve.work_of_recovery(&active, body, scene.state, scene.settings);
                 }
                 if let Some(figure) = solve.problem.figures.list().get(active.figure as usize) {
-                    body.set_figure_rates(&figure.v1, scene.state);
+                    body.set_figure_rates(figure.v1.iter().map(|rate| share * rate), scene.state);
                 } else if let Some(node) = solve.node(active.start) {
-                    let twist = solve.problem.frames[active.start as usize].twist();
-                    body.keep_twist(node, twist, scene.state);
+                    let Twist { linear, angular } = solve.problem.frames[active.start as usize].twist();
+                    body.keep_twist(node, Twist { linear: share * linear, angular: share * angular }, scene.state);
                 }
             }
             solve.take_back_forces(scene);
@@ -47,15 +47,16 @@ impl Integrator {
 
 impl Solve {
     /// Prepares the second solution, which goes on from where the first one ended, unless bodies parted so fast there that
-    /// another start is nearer. Answers whether one is wanted.
-    fn start_over_without_recovery(&mut self, scene: &Scene) -> bool {
+    /// another start is nearer. Answers the first one's energy of motion, J, if a second is wanted.
+    fn start_over_without_recovery(&mut self, scene: &Scene) -> Option<f64> {
         let contacts = &mut self.problem.terms.contacts;
         let is_deep = contacts.iter().any(ContactTerm::recovers);
         if is_deep {
             contacts.iter_mut().for_each(|contact| contact.stop_recovery());
             (self.is_pending, self.problem.is_parting) = (true, true);
         }
-        is_deep && scene.settings.contact.recovery_speed > 0.0
+        let is_wanted = is_deep && scene.settings.contact.recovery_speed > 0.0;
+        is_wanted.then(|| self.problem.kinetic_energy())
     }
 
     /// By how much more energy the body has where recovery put it than where the second solution would, J.
@@ -77,7 +78,9 @@ impl Solve {
         let (problem, dt) = (&self.problem, self.problem.dt);
         for (term, &source) in problem.terms.contacts.iter().zip(&self.contacts) {
             let force = term.normal_force(dt, problem.pair(term));
-            scene.contacts[source as usize].normal_force = finite_or_zero(DVec3::X * force).x;
+            let contact = &mut scene.contacts[source as usize];
+            contact.normal_force = finite_or_zero(DVec3::X * force).x;
+            contact.load = contact.load.min(contact.normal_force);
         }
     }
 }

@@ -276,6 +276,7 @@ impl Solve {
     /// Hands back what potentials remember, and looks how well they hold.
     fn write_back(&self, scene: &mut Scene, report: &mut StepReport) {
         let (problem, dt) = (&self.problem, self.problem.dt);
+        let is_solved = self.report.stopped_because == StoppedBecause::Tolerance;
         let mut outcomes = problem.terms.contacts.iter().map(|term| term.outcome(dt, problem.pair(term)));
         for (&source, outcome) in self.contacts.iter().zip(&mut outcomes) {
             let Outcome { normal_force, depth, anchor, stiffening, blow } = outcome;
@@ -283,7 +284,9 @@ impl Solve {
             contact.anchor = finite_or_zero(anchor);
             contact.blow = blow;
             contact.stiffening = if stiffening.is_finite() { stiffening } else { 0.0 };
-            contact.normal_force = if normal_force.is_finite() { normal_force } else { 0.0 };
+            let normal_force = if normal_force.is_finite() { normal_force } else { 0.0 };
+            contact.load = normal_force.min(if is_solved { contact.normal_force } else { contact.load });
+            contact.normal_force = normal_force;
             report.worst_penetration = report.worst_penetration.max(depth);
         }
         // Points of the second look live for one tick.

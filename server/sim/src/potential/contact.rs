@@ -182,7 +182,7 @@ impl ContactTerm {
         let stiffening = point.stiffening.clamp(1.0, most_stiffening);
         let loaded = settings.normal_stiffness * stiffening;
         let stiffness = loaded.max((overlap / settings.transition).min(STIFFEST));
-        let load_depth = depth_under(point.normal_force / (loaded * unit), settings.transition);
+        let load_depth = depth_under(point.load / (loaded * unit), settings.transition);
         let loaded_gap = point.gap.max(-load_depth);
         let start_gap = point.gap.max(-load_depth - settings.recovery_speed * dt);
         let (start_gap, loaded_gap) = parting_speed.map_or((start_gap, loaded_gap), |speed| (-speed * dt, -speed * dt));
@@ -526,6 +526,7 @@ mod tests {
                 start_gap: 1e-3,
                 excess_depth: 0.0,
                 loaded_gap: 0.0,
+                recovers: false,
                 stiffening: 1.0,
                 most_stiffening: 1.0,
                 tolerance: 1e-3,
@@ -537,6 +538,7 @@ mod tests {
                 limit: 0.0,
                 is_impact: false,
                 owed: 0.0,
+                rebounds: false,
                 start_speed: 0.0,
                 last_force: 0.0,
             };

@@ -177,7 +177,8 @@ fn spring(points: [DVec3; 2], rest_length: f64, damping: f64, start_length: f64)
 
 fn contact(normal: DVec3, gap: f64, anchor: DVec3, arms: [DVec3; 2], normal_force: f64) -> ContactTerm {
     let mut point = ContactPoint::at(DVec3::ZERO, normal, gap, 0.7);
-    (point.anchor, point.normal_force) = (anchor - normal * normal.dot(anchor), normal_force);
+    point.anchor = anchor - normal * normal.dot(anchor);
+    (point.normal_force, point.load) = (normal_force, normal_force);
     ContactTerm::new([0, 1], &point, arms, 2.0, Approach::default(), &ContactSettings::default(), DT)
 }
 
