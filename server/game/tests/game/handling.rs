@@ -4,6 +4,7 @@
 use std::f64::consts::PI;
 
 use pita_game::Controls;
+use pita_game::driver::Motion;
 use pita_game::vehicle::VehicleParameters;
 use pita_game::vehicle::parameters::drive_train::RPM;
 use pita_sim::DVec3;
@@ -27,12 +28,16 @@ struct Figures {
     slalom_width: f64,
     /// Slalom: half of its change of heading, rad.
     slalom_heading: f64,
+    /// The same of a wave that a driver follows.
+    pursuit_width: f64,
+    pursuit_heading: f64,
 }
 
 impl Figures {
     fn of(tick_hz: u16) -> Self {
         let (skid_pad, cornering) = skid_pad(tick_hz);
         let (slalom_width, slalom_heading) = slalom(tick_hz);
+        let (pursuit_width, pursuit_heading) = pursuit(tick_hz);
         Self {
             sprint: TestTrack::with_parked_car_at(tick_hz).run_until(20.0, FULL_THROTTLE, |t| t.speed() >= 100.0 / 3.6),
             braking: braking(tick_hz),
@@ -41,10 +46,12 @@ impl Figures {
             cornering,
             slalom_width,
             slalom_heading,
+            pursuit_width,
+            pursuit_heading,
         }
     }
 
-    fn numbers(&self) -> [(&'static str, f64); 7] {
+    fn numbers(&self) -> [(&'static str, f64); 9] {
         [
             ("0 to 100 km/h, s", self.sprint),
             ("braking from 20 m/s, m", self.braking),
@@ -53,6 +60,8 @@ impl Figures {
             ("sideways there, m/s²", self.cornering),
             ("half width of the slalom, m", self.slalom_width),
             ("half the change of heading in the slalom, rad", self.slalom_heading),
+            ("half width of a wave with a driver, m", self.pursuit_width),
+            ("half its change of heading, rad", self.pursuit_heading),
         ]
     }
 }
@@ -103,12 +112,34 @@ fn slalom(tick_hz: u16) -> (f64, f64) {
     let wave = &path[2 * period - 1..];
     let (first, line) = (wave[0].position, wave[period].position - wave[0].position);
     let across = line.cross(DVec3::Y).normalize();
-    let half_range = |numbers: &mut dyn Iterator<Item = f64>| {
-        let (least, most) = numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
-        0.5 * (most - least)
-    };
-    let width = half_range(&mut wave.iter().map(|car| across.dot(car.position - first)));
-    (width, half_range(&mut wave.iter().map(|car| (car.yaw() - wave[0].yaw()).sin())))
+    let width = half_range(wave.iter().map(|car| across.dot(car.position - first)));
+    (width, half_range(wave.iter().map(|car| (car.yaw() - wave[0].yaw()).sin())))
+}
+
+fn half_range(numbers: impl Iterator<Item = f64>) -> f64 {
+    let (least, most) = numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+    0.5 * (most - least)
+}
+
+/// A driver in the loop, who steers in every tick after a point 8 m ahead of the car on a wave of 60 m and 2 m, at 15 m/s:
+/// half the width of what the car drives, and half of its change of heading. Whatever is late in car or tick widens it.
+fn pursuit(tick_hz: u16) -> (f64, f64) {
+    let mut track = TestTrack::with_parked_car_at(tick_hz);
+    track.run_until(10.0, FULL_THROTTLE, |t| t.speed() >= 15.0);
+    let (start, mut path) = (track.car(0).position.x, Vec::new());
+    while path.last().is_none_or(|car: &Motion| car.position.x < start + 240.0) {
+        let car = track.car(0);
+        let ahead = car.position.x + 8.0;
+        let aim = DVec3::new(ahead, 0.0, 2.0 * (2.0 * PI * (ahead - start) / 60.0).sin());
+        let steer = (-car.bearing(aim) / 0.5).clamp(-1.0, 1.0);
+        let throttle = (0.5 * (15.0 - track.speed())).clamp(0.0, 1.0);
+        track.drive(0, Controls { steer, throttle, ..COAST });
+        track.tick();
+        path.push(track.car(0));
+        assert!(path.len() < 40 * usize::from(tick_hz), "{:?}", track.car(0));
+    }
+    let waves = path.iter().filter(|car| car.position.x > start + 120.0);
+    (half_range(waves.clone().map(|car| car.position.z)), half_range(waves.map(Motion::yaw)))
 }
 
 #[test]

@@ -122,6 +122,8 @@ pub(crate) struct Body {
     pub index: u32,
     /// Unit vector of the body about which it spins in this tick, where what turns that axis is an axle or a hinge.
     pub wheel_axis: Option<DVec3>,
+    /// How that axis is going to turn in this tick, by what carries and steers it: a scaled axis in the world, rad.
+    pub wheel_turn: DVec3,
     /// Its state became non-finite: it stays where it last was sane, outside dynamics and collision.
     pub quarantined: bool,
     /// How still it has been.
@@ -209,15 +211,17 @@ impl Pose {
 /// loses no energy (DESIGN, section 3).
 ///
 /// A wheel's axis is held by its axle, so the free motion of that axis, a nutation of up to 2 rad a tick, is a wrong
-/// guess from which Newton does not come back. There R* = R0, and R1 = exp(dt (u − spin)) exp(dt spin) R0 with spin the
-/// part of u along the axis: the axis is a smooth function of what turns it, however fast the wheel spins up.
+/// guess from which Newton does not come back. There R* is R0 with the axis turned to where what carries and steers it will
+/// have it, and R1 = exp(dt (u − spin − free_spin)) exp(dt spin) R* with spin the part of u along the axis: the axis is a
+/// smooth function of what turns it, however fast the wheel spins up. It rolls along where it is headed at the end of the
+/// tick: where that was its heading at the start, a car answered its steering a tick and a half late.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Node {
     /// Pose at the start of the tick.
     pub start: Pose,
-    /// Rotation after the tick without torque; of a wheel, at its start.
+    /// Rotation after the tick without torque; of a wheel, that at its start with the axis turned.
     pub free_rotation: DQuat,
-    /// Angular velocity that leads to `free_rotation`, rad/s; zero for a wheel.
+    /// Angular velocity that leads to `free_rotation`, rad/s.
     pub free_spin: DVec3,
     /// Twist at the end of the tick under gravity and outer forces alone.
     pub target: Twist,
@@ -231,7 +235,7 @@ pub(crate) struct Node {
     /// Its inverse.
     pub inverse_inertia: DMat3,
     pub rotates: bool,
-    /// Axis of a wheel at the start of the tick.
+    /// Axis of a wheel at `free_rotation`.
     pub wheel_axis: Option<DVec3>,
     /// Angular velocity with which Newton starts, where that of the guess would be a bad one, rad/s.
     pub guessed_spin: Option<DVec3>,
@@ -249,9 +253,10 @@ impl Node {
         Twist { linear, angular: self.target.angular + self.impulse.angular }
     }
 
-    /// Angular velocity of a wheel whose `axis` gets to `wanted` within the tick while it spins on, rad/s.
+    /// Angular velocity of a wheel whose `axis`, at the start of the tick, gets to `wanted` within it while the wheel spins
+    /// on about where it is headed, rad/s.
     pub fn following(&self, axis: DVec3, wanted: DVec3, dt: f64) -> DVec3 {
-        axis * axis.dot(self.before.angular) + axis.cross(wanted) / dt
+        self.wheel_axis.unwrap_or(axis) * axis.dot(self.before.angular) + axis.cross(wanted) / dt
     }
 
     /// The twist of a momentum.

@@ -26,11 +26,11 @@ pub(super) fn twist(v: &[f64]) -> Twist {
 
 pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: Gravity) -> Node {
     let (start, before) = (pose(q), twist(v));
-    let wheel_axis = body.wheel_axis.map(|axis| start.rotation * axis);
-    let free_rotation = match wheel_axis {
-        Some(_) => start.rotation,
+    let free_rotation = match body.wheel_axis {
+        Some(_) => (DQuat::from_scaled_axis(body.wheel_turn) * start.rotation).normalize(),
         None => torque_free_flow(start.rotation, before.angular, body.inertia, dt),
     };
+    let wheel_axis = body.wheel_axis.map(|axis| free_rotation * axis);
     let axes = DMat3::from_quat(free_rotation);
     let inertia = turned_out(axes, body.inertia);
     let inverse_inertia = turned_out(axes, body.inertia.recip());
@@ -40,7 +40,7 @@ pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: Gravity)
         linear: before.linear + gravity.fall(dt) + dt * (body.force / body.mass),
         angular: carried_spin + dt * (inverse_inertia * body.torque),
     };
-    let free_spin = if body.wheel_axis.is_some() { DVec3::ZERO } else { carried_spin };
+    let free_spin = if body.wheel_axis.is_some() { body.wheel_turn / dt } else { carried_spin };
     let mass = body.mass;
     let (rotates, guessed_spin) = (true, None);
     Node {

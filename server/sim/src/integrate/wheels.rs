@@ -16,12 +16,16 @@ const ROUND: f64 = 0.01;
 /// Finds the wheels of this tick.
 pub(super) fn find(scene: &mut Scene) {
     for &id in scene.order {
-        scene.bodies[id].wheel_axis = None;
+        (scene.bodies[id].wheel_axis, scene.bodies[id].wheel_turn) = (None, DVec3::ZERO);
     }
     for (_, axle) in scene.potentials.axles.awake() {
-        if scene.bodies.get(axle.chassis).is_some_and(|chassis| !chassis.quarantined) {
-            scene.bodies[axle.wheel].wheel_axis = Some(DVec3::Z);
-        }
+        let Some(chassis) = scene.bodies.get(axle.chassis).filter(|chassis| !chassis.quarantined) else { continue };
+        let carrier = (chassis.pose(scene.state).rotation, chassis.twist(scene.state).angular);
+        let turned = DQuat::from_scaled_axis(scene.settings.dt * carrier.1) * carrier.0;
+        let headed = turned * DQuat::from_rotation_y(axle.control.steer) * DVec3::Z;
+        let wheel = &mut scene.bodies[axle.wheel];
+        wheel.wheel_turn = turn_between(wheel.pose(scene.state).rotation * DVec3::Z, headed);
+        wheel.wheel_axis = Some(DVec3::Z);
     }
     for (_, hinge) in scene.potentials.hinges.awake() {
         let ([axes, _], ends) = (hinge.desc.axes, [hinge.desc.desc.a, hinge.desc.desc.b]);
@@ -40,6 +44,14 @@ pub(super) fn find(scene: &mut Scene) {
             scene.bodies[id].wheel_axis = Some(axes[wheel]);
         }
     }
+}
+
+/// The shortest turn from one unit vector to another, as a scaled axis, rad; none where they face away from each other,
+/// which an axle that holds never comes to.
+fn turn_between(from: DVec3, to: DVec3) -> DVec3 {
+    let (across, along) = (from.cross(to), from.dot(to));
+    let sine = across.length();
+    if along <= 0.0 || sine == 0.0 { DVec3::ZERO } else { across * (sine.atan2(along) / sine) }
 }
 
 /// Whether a rigid body is one of revolution, near enough, about the line through `point` along `axis`.
@@ -61,22 +73,22 @@ fn speed_about(body: &Body, axis: DVec3, state: &State) -> f64 {
 }
 
 impl Solve {
-    /// Where one of two ends that share a direction, given in both frames, is a wheel about it: the axis at the start of
-    /// the tick. Newton then starts with a wheel whose axis follows what carries it, as that turned in the last tick; the
+    /// Where one of two ends that share a direction, given in both frames, is a wheel about it: the axis about which it
+    /// spins in the tick. Newton then starts with a wheel whose axis follows what carries it, as that turned in the last tick; the
     /// wheel's own momentum says something else, it resists any turn of its axis.
     pub(super) fn carry_wheel(&mut self, ends: [End; 2], axes: [DVec3; 2]) -> Option<DVec3> {
         let is_wheel = |i: usize| {
             let node = self.node(ends[i].frame)?;
-            let axis = node.start.rotation * axes[i];
-            (node.wheel_axis?.cross(axis).length() < ROUND).then_some((i, axis))
+            let axis = node.free_rotation * axes[i];
+            (node.wheel_axis?.cross(axis).length() < ROUND).then_some((i, axis, node.start.rotation * axes[i]))
         };
-        let (wheel, axis) = is_wheel(1).or_else(|| is_wheel(0))?;
+        let (wheel, axis, before) = is_wheel(1).or_else(|| is_wheel(0))?;
         let dt = self.problem.dt;
         let carrier = self.start(ends[1 - wheel]);
         let turned = DQuat::from_scaled_axis(dt * DVec3::from(carrier.angular));
         let wanted = turned * DVec3::from(carrier.arm(axes[1 - wheel]));
         if let Unknown::Body(node) = &mut self.problem.unknowns[ends[wheel].frame as usize] {
-            node.guessed_spin = Some(node.following(axis, wanted, dt));
+            node.guessed_spin = Some(node.following(before, wanted, dt));
         }
         Some(axis)
     }

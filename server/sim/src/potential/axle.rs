@@ -87,7 +87,7 @@ pub(crate) struct AxleTerm {
     plane_stiffness: f64,
     /// Wheel's axis in the chassis' frame.
     axis: DVec3,
-    /// Wheel's axis at the start of the tick, about which spins and torques are measured.
+    /// Wheel's axis as it is headed in the tick, about which spins and torques are measured.
     spin_axis: DVec3,
     /// Hub along the chassis' y axis at the start of the tick, m.
     start_travel: f64,
@@ -205,7 +205,7 @@ impl Term for AxleTerm {
             .filter(|&(gain, target, limit)| gain * (spin - target).abs() < limit)
             .map(|(gain, ..)| gain / dt)
             .sum();
-        // About the axis at the start of the tick: that is what a wheel spins about without leaving its plane.
+        // About the axis as it is headed: that is what a wheel spins about without leaving its plane.
         let about = outer(self.spin_axis, self.spin_axis);
         let plane = (DMat3::IDENTITY - about) * self.plane_stiffness;
         blocks.add_rotation(plane + about * motors);

@@ -104,7 +104,8 @@ impl World {
         let (slice, serial) = (self.state.allocate(size.0, size.1), self.serials);
         self.serials += 1;
         let (force, torque, impulse, index) = (DVec3::ZERO, DVec3::ZERO, Twist::REST, ABSENT);
-        let (wheel_axis, quarantined, rest, asleep) = (None, false, Rest::new(size.1), None);
+        let (wheel_axis, wheel_turn, quarantined) = (None, DVec3::ZERO, false);
+        let (rest, asleep) = (Rest::new(size.1), None);
         let (colliders, figure) = (Vec::new(), None);
         let id = self.bodies.insert(Body {
             kind,
@@ -119,6 +120,7 @@ impl World {
             impulse,
             index,
             wheel_axis,
+            wheel_turn,
             quarantined,
             rest,
             asleep,
