@@ -51,7 +51,7 @@ impl Problem {
             account.work += self.gravity.fall(self.dt).dot(now.momentum) + figure.work(self.dt);
         }
         let Terms { springs, .. } = &self.terms;
-        account.work += self.work_put_in() + self.work_of(springs);
+        account.work += self.work_put_in() + self.rebound_work() + self.work_of(springs);
         account.share()
     }
 }

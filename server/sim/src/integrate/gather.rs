@@ -240,6 +240,7 @@ impl Integrator {
             let term = ContactTerm::second(frames, point, [arm(0), arm(1)], mass, settings, *dt);
             solve.problem.terms.contacts.push(term);
             solve.second.push(source);
+            solve.problem.looked_again = true;
         }
     }
 }

@@ -195,6 +195,8 @@ pub(crate) struct Problem {
     pub(super) solution: Vec<[f64; BLOCK_RATES_MAX]>,
     /// That solve parted bodies at speeds that they shall not keep.
     pub(super) is_parting: bool,
+    /// It has contacts of the second look.
+    pub looked_again: bool,
     pub(super) products: ProductMemory,
 }
 
@@ -216,7 +218,7 @@ impl Problem {
         self.figures.clear();
         self.frames.clear();
         self.solution.clear();
-        self.is_parting = false;
+        (self.is_parting, self.looked_again) = (false, false);
     }
 
     /// Blocks of unknowns.

@@ -21,8 +21,11 @@ impl Integrator {
         for island in 0..count {
             let solve = &mut self.solves[island];
             let Some(first_energy) = solve.start_over_without_recovery(scene) else { continue };
+            let first_work = scene.settings.audit_energy.then(|| solve.problem.work_put_in());
             self.workspace.solve(solve, &scene.settings.solver);
             solve.report.add_to(report);
+            // The motion that is kept is paid for by what was done on its way, not on the way that recovery went.
+            report.work_put_in += first_work.map_or(0.0, |first| solve.problem.work_put_in() - first);
             let share = (first_energy / solve.problem.kinetic_energy()).sqrt().min(1.0);
             for &member in self.islands.members(island) {
                 let active = self.active[member as usize];

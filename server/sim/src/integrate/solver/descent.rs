@@ -337,14 +337,15 @@ impl<const D: usize> Descent<D> {
     }
 
     /// One body's overflow must not spread over its island, nor a last step that went wrong. What is not the solution has
-    /// to pay for its motion.
+    /// to pay for its motion, and so has what the second look takes out of something in one tick, at any speed.
     fn return_to_best(&mut self, problem: &mut Problem, work: &mut Work, report: &mut SolveReport) {
         let Best { u, merit, residual, .. } = &self.best;
-        if report.stopped_because != StoppedBecause::Tolerance {
-            if merit.is_finite() {
-                self.u.clone_from(u);
-                (report.merit, report.residual) = (*merit, *residual);
-            }
+        let is_solved = report.stopped_because == StoppedBecause::Tolerance;
+        if !is_solved && merit.is_finite() {
+            self.u.clone_from(u);
+            (report.merit, report.residual) = (*merit, *residual);
+        }
+        if !is_solved || problem.looked_again {
             self.pay(problem, work);
         }
         problem.remember_solution(&self.u);
