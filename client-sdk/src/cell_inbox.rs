@@ -14,6 +14,21 @@ use pita_protocol::{
 /// bodies that two cells know. Beyond that no server is what it says it is.
 const GROUPS_KEPT_MAX: usize = 2 * 8 * GROUPS_MAX;
 
+/// A cell puts a keyframe at least every 32 ticks, the session's own snapshots come every tick: after so many of these
+/// without one of those it is silent. Three in a row are rarely lost; less would take losses for silence.
+const SILENT_SNAPSHOTS: u32 = 96;
+
+/// A cell to be taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Wish {
+    /// The cell.
+    pub cell: CellId,
+    /// How many of its layers, the first ones.
+    pub layers: u8,
+    /// How often it fell silent. A subscription of before another time is to be made anew.
+    pub silences: u32,
+}
+
 /// What arrived.
 #[derive(Debug)]
 pub enum Taken {
@@ -48,6 +63,17 @@ struct Reading {
     decoder: CellDecoder,
     /// Whether a keyframe is missing.
     is_lost: bool,
+    /// Own snapshots of the session since a keyframe was put.
+    unheard: u32,
+    /// How often that were too many.
+    silences: u32,
+}
+
+impl Default for Reading {
+    /// Nothing is known of it.
+    fn default() -> Self {
+        Self { decoder: CellDecoder::default(), is_lost: true, unheard: 0, silences: 0 }
+    }
 }
 
 impl CellInbox {
@@ -62,7 +88,7 @@ impl CellInbox {
         let is_granted = |cell: &CellId| granted.binary_search_by_key(cell, |grant| grant.cell).is_ok();
         let lost = self.cells.extract_if(.., |cell, _| !is_granted(cell)).map(|(cell, _)| cell).collect();
         for grant in granted {
-            self.cells.entry(grant.cell).or_insert_with(|| Reading { decoder: CellDecoder::default(), is_lost: true });
+            self.cells.entry(grant.cell).or_default();
         }
         Some(lost)
     }
@@ -75,6 +101,29 @@ impl CellInbox {
     /// The cells that the session may take, in order.
     pub fn granted(&self) -> &[CellGrant] {
         &self.granted
+    }
+
+    /// The cells to be taken, in order, of which as many layers as `allowed` makes of those that are granted.
+    pub fn wishes(&self, allowed: impl Fn(u8) -> u8) -> Vec<Wish> {
+        let silences = |cell: &CellId| self.cells.get(cell).map_or(0, |reading| reading.silences);
+        let wish =
+            |&CellGrant { cell, layers }: &CellGrant| Wish { cell, layers: allowed(layers), silences: silences(&cell) };
+        self.granted.iter().map(wish).collect()
+    }
+
+    /// A snapshot of the session's own arrived. Answers how many cells have fallen silent with it: nothing else notices a
+    /// subscription that came to nothing somewhere on the way, and the cell would be a hole for ever.
+    pub fn note_own_snapshot(&mut self) -> u64 {
+        let mut fallen_silent = 0;
+        for reading in self.cells.values_mut() {
+            reading.unheard += 1;
+            if reading.unheard >= SILENT_SNAPSHOTS {
+                (reading.unheard, reading.is_lost) = (0, true);
+                reading.silences = reading.silences.wrapping_add(1);
+                fallen_silent += 1;
+            }
+        }
+        fallen_silent
     }
 
     /// Whether the session takes `cell`.
@@ -105,6 +154,9 @@ impl CellInbox {
         let CellSnapshot { cell, tick, keyframe_age, departures, dof } = decode(bytes)?;
         let Some(reading) = self.cells.get_mut(&cell) else { return Ok(Taken::Foreign) };
         check_tick(tick, latest)?;
+        if keyframe_age == 0 {
+            reading.unheard = 0;
+        }
         match reading.decode(tick, &dof, keyframe_age == 0) {
             Ok(frame) => {
                 // Snapshots to come will be coded against it.
@@ -145,7 +197,9 @@ impl CellInbox {
         if groups <= GROUPS_KEPT_MAX {
             return Ok(());
         }
-        self.cells.insert(cell, Reading { decoder: CellDecoder::default(), is_lost: true });
+        if let Some(reading) = self.cells.get_mut(&cell) {
+            (reading.decoder, reading.is_lost) = (CellDecoder::default(), true);
+        }
         Err(WireError::Content { field: "groups of all cells", allowed: "those of one world" })
     }
 }
@@ -195,6 +249,27 @@ mod tests {
         let coded = encoder.encode(tick, &state, due, &[]);
         let (departures, keyframe_age) = (Vec::new(), coded.keyframe_age);
         encode(&CellSnapshot { cell: CELL, tick, keyframe_age, departures, dof: coded.dof })
+    }
+
+    #[test]
+    fn a_cell_without_a_keyframe_is_silent_and_one_at_rest_is_not() {
+        let (mut encoder, mut inbox) = (CellEncoder::new(Cadence::default()), CellInbox::default());
+        inbox.grant(1, granted(&[CELL]));
+        let silences = |inbox: &CellInbox| inbox.wishes(|layers| layers)[0].silences;
+        for tick in 1..=400 {
+            if let Some(due) = encoder.due(tick, &state(1.0)) {
+                let coded = encoder.encode(tick, &state(1.0), due, &[]);
+                let (departures, keyframe_age) = (Vec::new(), coded.keyframe_age);
+                let message = CellSnapshot { cell: CELL, tick, keyframe_age, departures, dof: coded.dof };
+                inbox.take(&encode(&message), 999).unwrap();
+            }
+            assert_eq!((inbox.note_own_snapshot(), silences(&inbox)), (0, 0));
+        }
+        assert!(inbox.wanted().is_empty());
+        let fallen: Vec<u64> = (0..SILENT_SNAPSHOTS).map(|_| inbox.note_own_snapshot()).collect();
+        assert_eq!(fallen.iter().sum::<u64>(), 1);
+        // It is to be subscribed to anew, once, and what was missed asked for.
+        assert_eq!((silences(&inbox), inbox.wanted().len(), inbox.note_own_snapshot()), (1, 1, 0));
     }
 
     #[test]

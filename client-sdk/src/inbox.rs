@@ -11,12 +11,12 @@ use std::{
 use pita_protocol::{
     WireError, decode,
     dof::Decoder,
-    message::{CellGrant, FATES_MAX, InputAck, InputFate, JoinAccepted, Keyframes, KeyframesWanted, Snapshot},
+    message::{FATES_MAX, InputAck, InputFate, JoinAccepted, Keyframes, KeyframesWanted, Snapshot},
 };
 
 use crate::{
     bodies::{Bodies, Source},
-    cell_inbox::{CellInbox, Taken},
+    cell_inbox::{CellInbox, Taken, Wish},
     input_clock::InputClock,
     line::Line,
     snapshot::ReceivedSnapshot,
@@ -123,6 +123,7 @@ impl Inbox {
             let lost = self.cells.grant(head.tick, granted);
             lost.into_iter().flatten().for_each(|cell| self.bodies.forget(cell));
         }
+        self.statistics.cells_fallen_silent += self.cells.note_own_snapshot();
         let layers = self.cells.granted().iter().map(|grant| grant.layers).max().unwrap_or(0);
         self.line.observe(head.tick, self.seconds(now), 1.0 / self.tick_hz, layers);
         self.bodies.take(Source::Own, &frame, &[], |_| false);
@@ -168,15 +169,15 @@ impl Inbox {
         }
     }
 
-    /// Changes where others cells or layers are to be taken: when the server said which, and how many layers less of each.
-    pub fn cells_version(&self) -> (u64, u8) {
-        (self.cells.granted_at(), self.line.layers(u8::MAX))
+    /// Changes where others cells or layers are to be taken, or some anew: when the server said which, how many layers less of
+    /// each, and how often one fell silent.
+    pub fn cells_version(&self) -> (u64, u8, u64) {
+        (self.cells.granted_at(), self.line.layers(u8::MAX), self.statistics.cells_fallen_silent)
     }
 
     /// The cells that the session takes, as granted and as far as the line allows, and the keyframes that it lacks of them.
-    pub fn cells_to_do(&self) -> (Vec<CellGrant>, Vec<KeyframesWanted>) {
-        let taken = |grant: &CellGrant| CellGrant { layers: self.line.layers(grant.layers), ..*grant };
-        (self.cells.granted().iter().map(taken).collect(), self.cells.wanted())
+    pub fn cells_to_do(&self) -> (Vec<Wish>, Vec<KeyframesWanted>) {
+        (self.cells.wishes(|granted| self.line.layers(granted)), self.cells.wanted())
     }
 
     /// Fractional tick whose input is due at `now`; `None` before the first snapshot.

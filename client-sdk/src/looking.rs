@@ -8,11 +8,12 @@ use std::{
 
 use pita_protocol::{
     Keys, encode,
-    message::{CellGrant, CellId, KeyframesRequest, KeyframesWanted},
+    message::{CellId, KeyframesRequest, KeyframesWanted},
 };
 use zenoh::pubsub::Subscriber;
 
 use crate::{
+    cell_inbox::Wish,
     conditioner::{ConditionerSettings, Delivery, Link},
     lock::lock,
     shared::Shared,
@@ -37,7 +38,8 @@ pub struct Looking {
     way: Duration,
     /// Else they come along with the session's snapshots.
     subscribes: bool,
-    layers: BTreeMap<(CellId, u8), Subscriber<()>>,
+    /// With how often the cell had fallen silent before.
+    layers: BTreeMap<(CellId, u8), (u32, Subscriber<()>)>,
 }
 
 impl Looking {
@@ -61,9 +63,9 @@ impl Looking {
     /// Runs until it is aborted.
     pub async fn run(mut self) {
         loop {
-            let (granted, wanted) = lock(&self.shared.inbox).cells_to_do();
+            let (wishes, wanted) = lock(&self.shared.inbox).cells_to_do();
             if self.subscribes {
-                self.follow(&granted).await;
+                self.follow(&wishes).await;
             }
             if wanted.is_empty() {
                 self.shared.cells_changed.notified().await;
@@ -74,17 +76,20 @@ impl Looking {
         }
     }
 
-    /// Subscribes to what is `granted`, and to nothing else.
-    async fn follow(&mut self, granted: &[CellGrant]) {
-        let wanted = |cell: CellId, layer: u8| granted.iter().any(|grant| grant.cell == cell && layer < grant.layers);
-        self.layers.retain(|&(cell, layer), _| wanted(cell, layer));
-        for grant in granted {
-            for layer in 0..grant.layers {
-                if self.layers.contains_key(&(grant.cell, layer)) {
+    /// Subscribes to what is wished for, and to nothing else; anew to cells that have fallen silent.
+    async fn follow(&mut self, wishes: &[Wish]) {
+        let wished = |cell: CellId, layer: u8, silences: u32| {
+            wishes.iter().any(|wish| wish.cell == cell && layer < wish.layers && wish.silences == silences)
+        };
+        // Dropped, they are taken back: beside one of the same key a new one would not be declared to the server.
+        self.layers.retain(|&(cell, layer), &mut (silences, _)| wished(cell, layer, silences));
+        for wish in wishes {
+            for layer in 0..wish.layers {
+                if self.layers.contains_key(&(wish.cell, layer)) {
                     continue;
                 }
-                match self.subscribe(self.keys.cell(grant.cell, layer)).await {
-                    Ok(subscriber) => drop(self.layers.insert((grant.cell, layer), subscriber)),
+                match self.subscribe(self.keys.cell(wish.cell, layer)).await {
+                    Ok(subscriber) => drop(self.layers.insert((wish.cell, layer), (wish.silences, subscriber))),
                     Err(error) => tracing::debug!("subscribing to a cell: {error}"),
                 }
             }

@@ -33,6 +33,8 @@ pub struct Statistics {
     pub cells_unreadable: u64,
     /// Keyframes of cells that were asked for, by newcomers and after a loss.
     pub keyframes_fetched: u64,
+    /// Times that a cell said nothing for three seconds while the session's own snapshots came. It was subscribed to anew.
+    pub cells_fallen_silent: u64,
     /// Events that were new.
     pub events_received: u64,
     /// Events that were announced and did not arrive; the roster was read again after each gap.
@@ -75,6 +77,7 @@ impl Default for Statistics {
             cells_received: 0,
             cells_unreadable: 0,
             keyframes_fetched: 0,
+            cells_fallen_silent: 0,
             events_received: 0,
             events_missed: 0,
             malformed: 0,
@@ -123,7 +126,7 @@ impl Statistics {
         [&mut self.latency_us, &mut self.jitter_us, &mut self.lead_us, &mut self.correction_um]
     }
 
-    fn counts(&mut self) -> [&mut u64; 18] {
+    fn counts(&mut self) -> [&mut u64; 19] {
         [
             &mut self.snapshots_received,
             &mut self.snapshots_missed,
@@ -132,6 +135,7 @@ impl Statistics {
             &mut self.cells_received,
             &mut self.cells_unreadable,
             &mut self.keyframes_fetched,
+            &mut self.cells_fallen_silent,
             &mut self.events_received,
             &mut self.events_missed,
             &mut self.malformed,

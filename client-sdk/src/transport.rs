@@ -66,9 +66,15 @@ fn config(endpoint: &str, batch_max: u16) -> zenoh::Result<Config> {
 }
 
 /// Closes a connection. Failure to do so in time changes nothing for the caller.
+///
+/// In a task of its own: Zenoh blocks the thread meanwhile in an executor of its own, which on the thread of a `block_on`
+/// (`#[tokio::main]`) takes the wake-ups of whatever else the caller waits for beside this, so that it waits for ever.
 pub async fn close(zenoh: &zenoh::Session) {
-    match timeout(CLOSE_TIMEOUT, zenoh.close()).await {
-        Ok(Ok(())) => {}
+    let zenoh = zenoh.clone();
+    let closing = tokio::spawn(async move { zenoh.close().await });
+    match timeout(CLOSE_TIMEOUT, closing).await {
+        Ok(Ok(Ok(()))) => {}
+        Ok(Ok(Err(error))) => tracing::debug!("closing the connection: {error}"),
         Ok(Err(error)) => tracing::debug!("closing the connection: {error}"),
         Err(_) => tracing::debug!("the connection did not close within {CLOSE_TIMEOUT:?}"),
     }

@@ -2,6 +2,7 @@
 //! may do. The real server is tested with this library in `pita-tests`.
 
 mod bots;
+mod cells;
 mod command_line;
 mod datagrams;
 mod ending;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use pita_client::Session;
 use pita_protocol::dof::CellDecoder;
 use pita_protocol::message::{CellId, CellSnapshot, Keyframes, KeyframesRequest, KeyframesWanted};
-use pita_protocol::{decode, encode};
+use pita_protocol::{Keys, decode, encode};
 use pita_tests::observer::{self, Observer};
 use pita_tests::relay::Relay;
 use pita_tests::server_process::ServerProcess;
@@ -101,34 +101,39 @@ struct Looker {
 }
 
 impl Looker {
-    /// Looks at `cell` until `enough` says so.
-    async fn look(endpoint: &str, observer: &Observer, cell: CellId, enough: impl Fn(&Self) -> bool) -> Self {
-        let session = observer::open(endpoint).await.unwrap();
-        let key = format!("pita/{}/cell/{}/{}/*", observer.keys().arena(), cell.x, cell.z);
+    /// Looks at `cell` until it has two of `crates`, and answers which.
+    async fn look(endpoint: String, keys: Keys, cell: CellId, crates: BTreeSet<u32>) -> BTreeSet<u32> {
+        let session = observer::open(&endpoint).await.unwrap();
+        let key = format!("pita/{}/cell/{}/{}/*", keys.arena(), cell.x, cell.z);
         // A full channel of the other kind holds up the thread that answers come by.
         let messages = session.declare_subscriber(key).with(RingChannel::new(1024)).await.unwrap();
         let mut looker = Self { decoder: CellDecoder::default(), bodies: BTreeMap::new() };
-        looker.fetch(&session, observer, cell).await;
+        looker.fetch(&session, &keys, cell).await;
         let until = Instant::now() + SOON;
-        while !enough(&looker) {
+        while looker.seen(&crates).len() < 2 {
             assert!(Instant::now() < until, "{cell:?}: {:?}", looker.bodies);
             let message = tokio::time::timeout(SOON, messages.recv_async()).await.expect("a cell speaks").unwrap();
             let message: CellSnapshot = decode(&message.payload().to_bytes()).unwrap();
             assert_eq!(message.cell, cell);
             match looker.decoder.decode(message.tick, &message.dof, message.keyframe_age == 0) {
                 Ok(frame) => looker.bodies = frame.bodies().map(|(body, at)| (body.id, at)).collect(),
-                Err(_) => looker.fetch(&session, observer, cell).await,
+                Err(_) => looker.fetch(&session, &keys, cell).await,
             }
         }
         drop(messages);
         session.close().await.unwrap();
-        looker
+        looker.seen(&crates)
     }
 
-    async fn fetch(&mut self, session: &zenoh::Session, observer: &Observer, cell: CellId) {
+    /// Those of `crates` that it has.
+    fn seen(&self, crates: &BTreeSet<u32>) -> BTreeSet<u32> {
+        self.bodies.keys().copied().filter(|id| crates.contains(id)).collect()
+    }
+
+    async fn fetch(&mut self, session: &zenoh::Session, keys: &Keys, cell: CellId) {
         let wanted = KeyframesWanted { cell, have: self.decoder.keyframe().unwrap_or(0) };
         let request = encode(&KeyframesRequest { cells: vec![wanted] });
-        let replies = session.get(observer.keys().keyframes()).payload(request).timeout(SOON).await.unwrap();
+        let replies = session.get(keys.keyframes()).payload(request).timeout(SOON).await.unwrap();
         let reply = replies.recv_async().await.unwrap();
         let answer: Keyframes = decode(&reply.result().unwrap().payload().to_bytes()).unwrap();
         for keyframe in &answer.cells[0].keyframes {
@@ -145,17 +150,12 @@ async fn who_looks_where_gets_what_is_there_and_newcomers_begin_at_the_keyframe(
     let player = connect(&server.endpoint, "player").await;
     let crates = crates(&player);
     assert_eq!(crates.len(), 4);
-    let of_crates =
-        |looker: &Looker| -> BTreeSet<u32> { looker.bodies.keys().copied().filter(|id| crates.contains(id)).collect() };
-    let two = |looker: &Looker| of_crates(looker).len() == 2;
-    let looking = async {
-        tokio::join!(
-            Looker::look(&server.endpoint, &observer, WEST, two),
-            Looker::look(&server.endpoint, &observer, EAST, two),
-        )
-    };
+    // In tasks of their own: to close a session Zenoh blocks the thread in an executor of its own, which takes the wake-ups
+    // of whatever else a test's main future waits for.
+    let look = |cell| Looker::look(server.endpoint.clone(), observer.keys().clone(), cell, crates.clone());
+    let (west, east) = (tokio::spawn(look(WEST)), tokio::spawn(look(EAST)));
+    let looking = async { (west.await.unwrap(), east.await.unwrap()) };
     let (west, east) = tokio::time::timeout(LONG, looking).await.expect("both see their crates");
-    let (west, east) = (of_crates(&west), of_crates(&east));
     assert!(west.is_disjoint(&east), "{west:?} {east:?}");
     assert_eq!(&west | &east, crates);
 
