@@ -3,7 +3,7 @@
 //! At the solution of a tick the energy of motion grows by no more than the work of what acts: that is implicit Euler, and
 //! convex potentials. Short of the solution nothing says so; a state with less incremental potential than the start may
 //! move at up to twice the speed, and the next tick starts from that. So where a solve ends early its rates shrink until
-//! they are paid for. Contacts, joints and limits may take energy, not give it. What recovery brings is not asked about:
+//! they are paid for. Contacts, joints and limits may take energy, not give it, but for restitution. What recovery brings is not asked about:
 //! Q' forgets it (`recovery`).
 
 use super::problem::{Problem, Terms, Unknown};

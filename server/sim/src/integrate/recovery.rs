@@ -2,8 +2,8 @@
 //!
 //! A contact that starts out deep is solved twice. The first solution, with the depth taken back at a bounded speed, moves
 //! Q. The second is that of the same tick with the bodies just touching; it is what Q' and the contacts' forces become, so
-//! that momentum is that of a tick without recovery. It keeps no more energy of motion than the first one: what is wedged in
-//! stands still, though a tick in which it just touched would let it go. Only islands with a deep contact pay for it.
+//! that momentum is that of a tick without recovery, unless that would leave more energy of motion than the first one: what
+//! is wedged in stands still, though a tick in which it just touched would let it go. Only islands with a deep contact pay for it.
 
 use super::StepReport;
 use super::gather::Active;

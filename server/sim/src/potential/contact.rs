@@ -513,6 +513,19 @@ mod tests {
         }
     }
 
+    /// The force of a depth that a solver left is no load, and explains no depth.
+    #[test]
+    fn only_a_load_explains_a_depth() {
+        let settings = ContactSettings::default();
+        let mut point = crate::collide::ContactPoint::at(DVec3::ZERO, DVec3::NEG_Y, -0.1, 0.5);
+        for (load, recovers) in [(0.0, true), (1e9, false)] {
+            (point.normal_force, point.load) = (1e9, load);
+            let arms = [DVec3::ZERO; 2];
+            let term = ContactTerm::new([0, FIXED], &point, arms, 1.0, Approach::default(), &settings, 1.0 / 30.0);
+            assert_eq!(term.recovers(), recovers, "of a load of {load} N");
+        }
+    }
+
     /// What is idle has no Hessian, and what bears a load is not idle, whichever way it moves.
     #[test]
     fn only_what_is_open_is_idle() {
