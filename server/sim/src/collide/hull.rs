@@ -90,7 +90,10 @@ impl Hull {
         self.bounds = Bound::EMPTY;
         let Some(body) = bodies.bodies.get(self.placed.body).filter(|body| !body.quarantined) else { return };
         match body.figure.as_ref().and_then(|figure| Some((figure, figure.hull(self.placed.index)?))) {
-            None => (self.pose, self.twist) = bodies.motion(&self.placed, body),
+            None => {
+                (self.pose, self.twist) = bodies.motion(&self.placed, body);
+                self.twist.linear += body.surge;
+            }
             Some((figure, hull)) => {
                 let deformed = self.deformed.get_or_insert_with(|| Box::new(Deformed::new(hull)));
                 let state = [bodies.state.q(body.slice), bodies.state.v(body.slice)];

@@ -103,7 +103,7 @@ impl World {
     fn add_body(&mut self, kind: DofKind, size: (u32, u32), mass: f64, inertia: DVec3) -> BodyId {
         let (slice, serial) = (self.state.allocate(size.0, size.1), self.serials);
         self.serials += 1;
-        let (force, torque, impulse, index) = (DVec3::ZERO, DVec3::ZERO, Twist::REST, ABSENT);
+        let (force, torque, impulse, surge, index) = (DVec3::ZERO, DVec3::ZERO, Twist::REST, DVec3::ZERO, ABSENT);
         let (wheel_axis, wheel_turn, quarantined) = (None, DVec3::ZERO, false);
         let (rest, asleep) = (Rest::new(size.1), None);
         let (colliders, figure) = (Vec::new(), None);
@@ -118,6 +118,7 @@ impl World {
             force,
             torque,
             impulse,
+            surge,
             index,
             wheel_axis,
             wheel_turn,

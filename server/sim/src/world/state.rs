@@ -100,6 +100,20 @@ impl World {
         Ok(())
     }
 
+    /// What a spring or a motor is expected to add to the velocity of a particle or rigid body within a tick, m/s, until it is
+    /// set anew. Contacts are found along the motion that bodies have when a tick begins; what is driven hard from rest would
+    /// be through a thin wall before any is found. Detection looks ahead as if the body had this velocity besides, and tells
+    /// of its collisions so; the motion itself does not depend on it.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, or a body that is gone or of another kind.
+    pub fn set_surge(&mut self, id: BodyId, surge: DVec3) -> Result<(), SimError> {
+        require_vector(surge, "surge")?;
+        let id = self.simple_body(id)?;
+        self.bodies[id].surge = surge;
+        Ok(())
+    }
+
     /// Pushes a particle or rigid body during the coming tick with `force`, N, at the world point `at`, m. Bodies of other
     /// kinds are pushed at a point of a part: [`World::apply_force_at`].
     ///

@@ -1,6 +1,6 @@
 //! Fast things: nothing gets through what is thin, and nothing is hit by what it passes.
 
-use pita_sim::{BodyId, Collider, DQuat, DVec3, RigidBodyDesc, Shape, StaticDesc, World};
+use pita_sim::{Anchor, BodyId, Collider, DQuat, DVec3, RigidBodyDesc, Shape, SpringDesc, StaticDesc, World};
 
 use super::{DT, ground, weightless, world};
 
@@ -52,6 +52,35 @@ fn a_ball_at_100_m_s_stops_at_a_wall_of_a_centimetre() {
                 assert!(x < 9.947, "from {start} m: at {x}");
             }
         }
+    }
+}
+
+/// A spring that drives a ball 2.5 m from rest in one tick, at a wall of 5 cm: with what it is expected to do, the ball stops
+/// in its near half, wherever that is; beside it, the ball passes.
+#[test]
+fn what_a_spring_drives_stops_at_a_thin_wall() {
+    let (stiffness, mass, reach) = (50_000.0, 10.0, 3.0);
+    let push = stiffness / mass * DT * DT;
+    let drive = |wall: f64, aside: f64| {
+        let mut world = weightless();
+        stand(&mut world, Shape::Box { half: DVec3::new(0.025, 2.0, 2.0) }, DVec3::new(wall, 0.0, 2.0 + aside));
+        let id = throw(&mut world, Shape::Ball { radius: 0.3 }, mass, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        let (a, b) = (Anchor::world(DVec3::X * -0.5), Anchor::body(id, DVec3::ZERO));
+        let damping = (stiffness * mass).sqrt();
+        world.add_spring(SpringDesc { a, b, rest_length: 0.5 + reach, stiffness, damping }).unwrap();
+        let mut farthest = 0.0f64;
+        for _ in 0..15 {
+            let ahead = reach - world.position(id).unwrap().x;
+            world.set_surge(id, DVec3::X * (ahead * push / (1.0 + push) / DT)).unwrap();
+            world.step();
+            farthest = farthest.max(world.position(id).unwrap().x);
+        }
+        farthest
+    };
+    for wall in (4..30).map(|wall| 0.1 * f64::from(wall)) {
+        let farthest = drive(wall, -2.0);
+        assert!((wall - 0.335..wall - 0.3).contains(&farthest), "wall at {wall} m: at {farthest} m");
+        assert!(drive(wall, 0.31) > 2.8, "wall at {wall} m, beside it");
     }
 }
 
