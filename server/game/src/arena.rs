@@ -24,7 +24,7 @@ use crate::arena_file::{BoundsFile, Materials, PrecisionFile};
 use crate::combat::CombatParameters;
 use crate::pipeline::Ports;
 use crate::spawn::Pose;
-use crate::step::{Effect, KindLogic, LogicReport, Other, Request};
+use crate::step::{Arrival, Effect, KindLogic, LogicReport, Other, Request};
 use crate::vehicle::VehicleParameters;
 use cast::Cast;
 pub use rounds::Rounds;
@@ -168,6 +168,8 @@ pub struct Arena {
     lost: Vec<u32>,
     others: Vec<Other>,
     requests: Vec<Request>,
+    /// Who was asked for and comes with the next tick.
+    arrivals: Vec<Arrival>,
     logic: LogicReport,
     /// By kind; kinds that were there once stay, with nothing.
     logic_by_kind: BTreeMap<&'static str, KindLogic>,
@@ -274,9 +276,10 @@ impl Arena {
         self.world.audit_energy();
     }
 
-    /// Stage 1: takes the commands that came in since the last tick and applies them.
+    /// Stage 1: takes the commands that came in since the last tick and applies them, and lets in who was asked for.
     pub(crate) fn collect_input(&mut self, ports: &mut impl Ports) {
         self.events.drain(..self.told);
+        self.logic = LogicReport::default();
         self.do_reloads();
         let mut commands = std::mem::take(&mut self.commands);
         ports.collect(self.ticks + 1, &mut commands);
@@ -286,6 +289,7 @@ impl Arena {
         self.commands = commands;
         // What the engine refuses now it may take in the next tick.
         let _refused = self.fill_places();
+        self.let_in_arrivals();
     }
 
     /// Stage 2: finds the contacts of this tick.

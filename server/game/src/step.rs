@@ -2,7 +2,7 @@
 //!
 //! Owns the actor's view of the world and of its fellow actors, and the list of what actors ask for. What they ask for
 //! is done by the arena when all of them have acted, in the order in which it was asked: who acts first sees nothing
-//! that the last one does not see.
+//! that the last one does not see. Actors that were asked for come at the end of the next tick's stage 1.
 
 use std::collections::BTreeMap;
 
@@ -73,9 +73,11 @@ pub struct Effect {
 /// Adds the bodies of a new actor, which has the given id, to the world.
 pub type Build = dyn FnOnce(&mut World, u32) -> Result<Box<dyn Actor>, SimError> + Send;
 
+/// An actor that was asked for: the id that it will have, and what builds it.
+pub(crate) type Arrival = (u32, Box<Build>);
+
 /// What an actor asked for.
 pub(crate) enum Request {
-    Add { id: u32, build: Box<Build> },
     Remove(u32),
     Tell { from: u32, to: u32, message: Message },
     Respawn(u32),
@@ -92,7 +94,7 @@ pub struct LogicReport {
     pub sporadic: usize,
     /// Messages that were heard.
     pub messages: usize,
-    /// Actors that came because another asked for them.
+    /// Actors that came in stage 1 because another asked for them in the tick before.
     pub added: usize,
     /// Actors that went for the same reason.
     pub removed: usize,
@@ -128,6 +130,7 @@ pub struct Step<'a> {
     pub(crate) owners: &'a BTreeMap<BodyId, u32>,
     pub(crate) next_actor: &'a mut u32,
     pub(crate) requests: &'a mut Vec<Request>,
+    pub(crate) arrivals: &'a mut Vec<Arrival>,
     pub(crate) report: &'a mut LogicReport,
 }
 
@@ -166,15 +169,16 @@ impl<'a> Step<'a> {
         near.min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 
-    /// Asks for a new actor; answers the id that it will have. It is there from the next tick on, unless the engine
-    /// refuses it: then nothing of it stays behind, and nobody has that id.
+    /// Asks for a new actor; answers the id that it will have. It is built at the end of the next tick's stage 1, so that
+    /// its contacts are found before it moves; until then it hears nothing. Where the engine refuses it, nothing of it
+    /// stays behind, and nobody has that id.
     pub fn add(
         &mut self,
         build: impl FnOnce(&mut World, u32) -> Result<Box<dyn Actor>, SimError> + Send + 'static,
     ) -> u32 {
         let others = self.others;
         let id = next_free(self.next_actor, |id| others.binary_search_by_key(&id, |other| other.id).is_ok());
-        self.requests.push(Request::Add { id, build: Box::new(build) });
+        self.arrivals.push((id, Box::new(build)));
         id
     }
 

@@ -85,6 +85,7 @@ impl Arena {
             lost: Vec::new(),
             others: Vec::new(),
             requests: Vec::new(),
+            arrivals: Vec::new(),
             logic: LogicReport::default(),
             logic_by_kind: BTreeMap::new(),
             placed: Placed::default(),

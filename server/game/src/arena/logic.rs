@@ -1,4 +1,4 @@
-//! Stage 3: actors come, act, are lost and go.
+//! Stage 3: actors act, are lost and go; and how actors come, in stage 1.
 
 use pita_sim::{BodyId, DVec3, SimError, World};
 
@@ -6,13 +6,13 @@ use super::{Arena, ArenaEvent};
 use crate::actor::{Actor, WhenLost};
 use crate::arena_file::{ACTORS_MAX, BoundsFile};
 use crate::spawn::{self, Pose};
-use crate::step::{EFFECTS_MAX, KindLogic, LogicReport, Other, Request, Step, next_free};
+use crate::step::{EFFECTS_MAX, KindLogic, Other, Request, Step, next_free};
 
 impl Arena {
     /// Lets every actor judge its collisions, sees to those who are lost, lets every actor act, in order of id, and does
     /// what they asked for.
     pub(crate) fn run_logic(&mut self) {
-        self.logic = LogicReport { actors: self.actors.len(), ..LogicReport::default() };
+        self.logic.actors = self.actors.len();
         self.judge_collisions();
         self.find_lost();
         self.see_to_lost();
@@ -75,6 +75,7 @@ impl Arena {
             owners: &self.owners,
             next_actor: &mut self.next_actor,
             requests: &mut self.requests,
+            arrivals: &mut self.arrivals,
             report: &mut self.logic,
         };
         self.logic_by_kind.values_mut().for_each(|logic| *logic = KindLogic::default());
@@ -90,6 +91,18 @@ impl Arena {
         }
     }
 
+    /// Stage 1, after commands: builds the actors that were asked for in the last tick. They come before contacts are found:
+    /// what came in stage 3 would move in stage 4 through whatever is in its way.
+    pub(super) fn let_in_arrivals(&mut self) {
+        let mut arrivals = std::mem::take(&mut self.arrivals);
+        for (id, build) in arrivals.drain(..) {
+            let is_added = self.build_actor(id, build).is_ok();
+            self.logic.added += usize::from(is_added);
+            self.logic.refused += usize::from(!is_added);
+        }
+        self.arrivals = arrivals;
+    }
+
     fn grant_requests(&mut self) {
         let mut requests = std::mem::take(&mut self.requests);
         for request in requests.drain(..) {
@@ -100,11 +113,6 @@ impl Arena {
 
     fn grant(&mut self, request: Request) {
         let is_granted = match request {
-            Request::Add { id, build } => {
-                let is_added = self.build_actor(id, build).is_ok();
-                self.logic.added += usize::from(is_added);
-                is_added
-            }
             Request::Remove(id) => {
                 let may_go = self.actors.get(&id).is_some_and(|actor| actor.describe().slot.is_none());
                 if may_go {

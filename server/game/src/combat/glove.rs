@@ -20,6 +20,9 @@ const RADIUS: f64 = 0.3;
 /// Length of the spring at the start, m.
 const COMPRESSED: f64 = 0.7;
 
+/// The least length of the spring, where something is right before the vehicle, m.
+const SHORTEST: f64 = 0.1;
+
 /// Damping ratio of the spring, as the glove alone would swing.
 const DAMPING: f64 = 0.15;
 
@@ -33,6 +36,10 @@ pub struct Glove {
     owner: u32,
     chassis: BodyId,
     damage: f64,
+    /// Where the spring is at rest, m before the chassis' origin.
+    farthest: f64,
+    /// Share of what is left to there that the spring would drive the glove in a tick if it did not slacken.
+    push: f64,
     /// Farther from the vehicle it is left behind, m.
     leash: f64,
     age: f64,
@@ -45,18 +52,14 @@ impl Glove {
     /// Asks for one at the vehicle's front.
     pub fn fire(step: &mut Step, p: &GloveParameters, muzzle: Muzzle) {
         let p = p.clone();
-        step.add(move |world, id| Ok(Box::new(Self::add(world, id, &p, &muzzle)?)));
+        step.add(move |world, id| Ok(Box::new(Self::add(world, id, &p, &muzzle.now(world)?)?)));
     }
 
     fn add(world: &mut World, id: u32, p: &GloveParameters, muzzle: &Muzzle) -> Result<Self, SimError> {
         let shape = Shape::Ball { radius: RADIUS };
-        // Where the vehicle is now: it moved since the shot was asked for.
-        let gone = || SimError::Gone { what: "the vehicle of the glove" };
-        let rotation = world.rotation(muzzle.chassis).ok_or_else(gone)?;
-        let front = world.position(muzzle.chassis).ok_or_else(gone)? + rotation * muzzle.front;
-        let start = front + rotation * (DVec3::X * RADIUS);
+        let start = Self::start(world, muzzle, &shape)?;
         let body = world.add_rigid_body(RigidBodyDesc {
-            rotation,
+            rotation: muzzle.rotation,
             velocity: muzzle.velocity,
             collider: Some(Collider::new(shape.clone(), Material::from(0.5))),
             ..RigidBodyDesc::new(start, p.mass, shape.inertia(p.mass))
@@ -72,17 +75,38 @@ impl Glove {
             damping: 2.0 * DAMPING * (p.stiffness * p.mass).sqrt(),
         })?;
         let parts = vec![PartInfo::new(world, body, shape)];
-        Ok(Self {
+        let glove = Self {
             info: ActorInfo { id, kind: KIND, name: "glove".to_owned(), slot: None, parts },
             body: [body],
             owner: muzzle.owner,
             chassis: muzzle.chassis,
             damage: p.damage,
+            farthest: muzzle.front.x + RADIUS + p.reach,
+            push: p.stiffness / p.mass * world.settings().dt.powi(2),
             leash: muzzle.front.length() + 2.0 * (COMPRESSED + p.reach),
             age: 0.0,
             hit: Vec::new(),
             told: 0,
-        })
+        };
+        glove.foresee(world)?;
+        Ok(glove)
+    }
+
+    /// Right before the front, or as near as what is there allows, not farther back than the spring's other end.
+    fn start(world: &World, muzzle: &Muzzle, shape: &Shape) -> Result<DVec3, SimError> {
+        muzzle.way_out(world, (shape, muzzle.rotation), [RADIUS - COMPRESSED + SHORTEST, RADIUS], RADIUS)
+    }
+
+    /// Lets detection know how the spring is about to drive the glove: at most as far as it does within a tick from here.
+    fn foresee(&self, world: &mut World) -> Result<(), SimError> {
+        let places = [self.body[0], self.chassis].map(|body| world.position(body));
+        let ([Some(glove), Some(chassis)], Some(rotation)) = (places, world.rotation(self.chassis)) else {
+            return Ok(());
+        };
+        let along = rotation * DVec3::X;
+        let ahead = self.farthest - (glove - chassis).dot(along);
+        let share = self.push / (1.0 + self.push);
+        world.set_surge(self.body[0], along * (ahead.max(0.0) * share / world.settings().dt))
     }
 
     fn is_left_behind(&self, world: &World) -> bool {
@@ -104,7 +128,8 @@ impl Actor for Glove {
     fn collide(&mut self, contact: &Contact) -> Response {
         match contact.partner {
             Partner::Actor { id, .. } if id == self.owner => return Response::Pass,
-            Partner::Actor { id, .. } if !self.hit.contains(&id) => self.hit.push(id),
+            // Who is only near may be behind a wall.
+            Partner::Actor { id, .. } if contact.impulse > 0.0 && !self.hit.contains(&id) => self.hit.push(id),
             _ => {}
         }
         Response::Collide
@@ -115,7 +140,10 @@ impl Actor for Glove {
             step.tell(victim, Message::Damage { amount: self.damage, by: Some(self.owner) });
         }
         self.told = self.hit.len();
+        if self.age > LIFE || self.is_left_behind(step.world) {
+            return super::end(step);
+        }
         self.age += step.dt;
-        if self.age > LIFE || self.is_left_behind(step.world) { super::end(step) } else { Ok(()) }
+        self.foresee(step.world)
     }
 }

@@ -6,8 +6,8 @@ use pita_sim::{
     World,
 };
 
-use super::Muzzle;
 use super::parameters::GrenadeParameters;
+use super::{Muzzle, Release};
 use crate::actor::{Actor, ActorInfo, Contact, Partner, Response};
 use crate::part::PartInfo;
 use crate::step::{Message, Step};
@@ -27,6 +27,7 @@ pub struct Grenade {
     body: [BodyId; 1],
     owner: u32,
     parameters: GrenadeParameters,
+    release: Release,
     age: f64,
     has_hit: bool,
 }
@@ -35,20 +36,29 @@ impl Grenade {
     /// Asks for one in front of the vehicle.
     pub fn fire(step: &mut Step, p: &GrenadeParameters, muzzle: Muzzle) {
         let p = p.clone();
-        step.add(move |world, id| Ok(Box::new(Self::add(world, id, p, &muzzle)?)));
+        step.add(move |world, id| Ok(Box::new(Self::add(world, id, p, &muzzle.now(world)?)?)));
     }
 
     fn add(world: &mut World, id: u32, p: GrenadeParameters, muzzle: &Muzzle) -> Result<Self, SimError> {
         let shape = Shape::Ball { radius: RADIUS };
         let forward = muzzle.rotation * DVec3::X;
+        let start = muzzle.throw(world, (&shape, DQuat::IDENTITY), RADIUS)?;
         let body = world.add_rigid_body(RigidBodyDesc {
             velocity: muzzle.velocity + forward * p.speed[0] + DVec3::Y * p.speed[1],
             collider: Some(Collider::new(shape.clone(), Material::from(0.5))),
-            ..RigidBodyDesc::new(muzzle.position + forward * (2.0 * RADIUS), p.mass, shape.inertia(p.mass))
+            ..RigidBodyDesc::new(start, p.mass, shape.inertia(p.mass))
         })?;
         let parts = vec![PartInfo::new(world, body, shape)];
         let info = ActorInfo { id, kind: KIND, name: "grenade".to_owned(), slot: None, parts };
-        Ok(Self { info, body: [body], owner: muzzle.owner, parameters: p, age: 0.0, has_hit: false })
+        Ok(Self {
+            info,
+            body: [body],
+            owner: muzzle.owner,
+            parameters: p,
+            release: Release::default(),
+            age: 0.0,
+            has_hit: false,
+        })
     }
 
     fn burst(&self, step: &mut Step) -> Result<(), SimError> {
@@ -92,13 +102,22 @@ impl Actor for Grenade {
     }
 
     fn collide(&mut self, contact: &Contact) -> Response {
-        self.has_hit |= matches!(contact.partner, Partner::Actor { id, kind: "vehicle" } if id != self.owner);
-        Response::Collide
+        match contact.partner {
+            Partner::Actor { id, .. } if id == self.owner => self.release.meet(),
+            Partner::Actor { kind: "vehicle", .. } => {
+                // Who is only near may be behind a wall.
+                self.has_hit |= contact.impulse > 0.0;
+                Response::Collide
+            }
+            _ => Response::Collide,
+        }
     }
 
     fn step(&mut self, step: &mut Step) -> Result<(), SimError> {
-        self.age += step.dt;
+        self.release.step();
         if self.age < self.parameters.fuse && !self.has_hit {
+            // In its first step it has not moved yet.
+            self.age += step.dt;
             return Ok(());
         }
         self.burst(step)?;

@@ -143,8 +143,8 @@ fn actors_come_and_go_on_request_and_nothing_stays_of_what_is_refused() {
     });
     track.tick();
     let logic = *track.arena.logic();
-    assert_eq!((logic.added, logic.refused, logic.effects), (1, 1, 1));
-    assert_eq!(track.arena.world().body_count(), 2);
+    assert_eq!((logic.added, logic.refused, logic.effects), (0, 0, 1));
+    assert_eq!(track.arena.world().body_count(), 1, "who is asked for comes with the next tick");
     let effect = track.arena.events().iter().find_map(|event| match event {
         ArenaEvent::Effect(effect) => Some(*effect),
         _ => None,
@@ -152,6 +152,9 @@ fn actors_come_and_go_on_request_and_nothing_stays_of_what_is_refused() {
     let effect = effect.expect("one was asked for");
     assert_eq!((effect.kind, effect.actor, effect.strength), ("poof", parent, 1.0));
     track.tick();
+    let logic = *track.arena.logic();
+    assert_eq!((logic.added, logic.refused, logic.actors), (1, 1, 2), "it acts in the tick in which it comes");
+    assert_eq!(track.arena.world().body_count(), 2);
     track.tick();
     assert!(track.arena.events().contains(&ArenaEvent::ActorRemoved(1)));
     assert_eq!((track.arena.world().body_count(), track.arena.actors().count()), (1, 1));

@@ -64,6 +64,51 @@ fn a_glove_throws_the_victim_back_and_the_owner_too_and_is_drawn_in() {
     }
 }
 
+/// A sheet before the nose, at whatever distance: what is fired stays on this side of it, and neither comes to nor harms who
+/// is right behind it.
+#[test]
+fn nothing_is_fired_through_a_thin_wall() {
+    let gaps = (0..30).map(|gap| 0.1 * f64::from(gap));
+    for weapon in ["glove", "saw", "grenade"] {
+        let keys = format!("weapons = [\"{weapon}\"]\ngrenade.radius = 0.5\ngrenade.damage = 0.0");
+        gaps.clone().for_each(|gap| fire_at_a_wall(&keys, weapon, gap));
+    }
+    // A spring that drives it 5 m in its first tick and 7.5 m in the next one.
+    let long = "weapons = [\"glove\"]\nglove = { reach = 20.0, stiffness = 18000.0 }";
+    (0..60).map(|gap| 0.25 * f64::from(gap)).for_each(|gap| fire_at_a_wall(long, "glove", gap));
+}
+
+/// Slot 0 fires at a wall `gap` m before its nose for three seconds, slot 1 stands behind it.
+fn fire_at_a_wall(keys: &str, weapon: &str, gap: f64) {
+    let wall = "[[statics]]\nshape.box.half = [0.05, 2.0, 5.0]\nmaterial = \"asphalt\"\nposition = [0.0, 2.0, 60.0]\n";
+    let mut track = TestTrack::new(&format!("{FLAT}\n{wall}[combat]\nhealth = 10.0\n{keys}\n"), SETTINGS);
+    track.enter(0);
+    track.enter(1);
+    both(&mut track, 1.0, COAST);
+    let height = track.car(0).position.y;
+    track.place(0, DVec3::new(-1.955 - gap, height, 60.0), DQuat::IDENTITY, DVec3::ZERO);
+    let behind = DVec3::new(1.98, height, 60.0);
+    track.place(1, behind, DQuat::from_rotation_y(PI), DVec3::ZERO);
+    both(&mut track, 0.1, FULL_BRAKE);
+    let mut seen = 0;
+    for _ in 0..90 {
+        both(&mut track, 1.0 / 30.0, FIRE);
+        let shots: Vec<u32> = track.arena.actors().filter(|info| info.kind == weapon).map(|info| info.id).collect();
+        for shot in shots {
+            let at = track.part_of(shot, 0).position;
+            let is_past = at.x > 0.0 && at.y < 4.0 && (at.z - 60.0).abs() < 5.0;
+            assert!(!is_past, "{weapon}, {gap} m off: at {at}, shot {seen}");
+            seen += 1;
+        }
+    }
+    assert!(seen > 10, "{weapon}: {seen}");
+    let victim = (id(&track, 1), track.car(1).position);
+    assert!((victim.1 - behind).length() < 0.1, "{weapon}, {gap} m off: {victim:?}");
+    let harmed = |event: &ArenaEvent| matches!(event, ArenaEvent::KnockedOut { actor, .. } if *actor == victim.0);
+    assert_eq!(count(&track, harmed), 0, "{weapon}, {gap} m off");
+    assert_eq!(track.quarantined(), 0, "{weapon}, {gap} m off");
+}
+
 #[test]
 fn a_saw_flies_cuts_and_vanishes() {
     let mut track = duel("health = 10.0\nrespawn_time = 60.0\nweapons = [\"saw\"]", 15.0);
@@ -249,6 +294,8 @@ fn a_car_fires_as_it_stands_after_a_reset() {
     let at = track.car(0).position;
     track.place(0, at + 2.0 * DVec3::Y, DQuat::from_rotation_z(0.45 * PI), DVec3::ZERO);
     both(&mut track, 1.0 / 30.0, Controls { reset: true, ..FIRE });
+    // It comes with the next tick.
+    both(&mut track, 1.0 / 30.0, FULL_BRAKE);
     let saw = track.arena.actors().find(|info| info.kind == "saw").expect("it flies").parts[0].slice;
     let slice = track.arena.world().slices().find(|slice| slice.serial == saw).unwrap();
     assert!(slice.v[0] > 20.0 && slice.v[1].abs() < 5.0, "{:?}", slice.v);
