@@ -24,6 +24,7 @@ mod pull_back;
 mod recovery;
 mod second_look;
 mod solver;
+mod spots;
 mod step;
 mod threads;
 mod vector;

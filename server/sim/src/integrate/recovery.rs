@@ -6,7 +6,7 @@
 //! is wedged in stands still, though a tick in which it just touched would let it go. Only islands with a deep contact pay for it.
 
 use super::StepReport;
-use super::gather::Active;
+use super::spots::Active;
 use super::step::{Integrator, Scene, Solve, finite_or_zero};
 use crate::dof::{Body, Twist, motion};
 use crate::potential::contact::ContactTerm;
@@ -17,18 +17,22 @@ use glam::DVec3;
 impl Integrator {
     /// After Q and Q' have been written: takes out of Q' what recovery brought.
     pub fn forget_recovery(&mut self, scene: &mut Scene, report: &mut StepReport) {
-        let count = self.islands.len();
-        for island in 0..count {
-            let solve = &mut self.solves[island];
-            let Some(first_energy) = solve.start_over_without_recovery(scene) else { continue };
-            let first_work = scene.settings.audit_energy.then(|| solve.problem.work_put_in());
-            self.workspace.solve(solve, &scene.settings.solver);
+        let Self { islands, active, solves, threads, .. } = self;
+        let solves = &mut solves[..islands.len()];
+        solves.iter_mut().for_each(|solve| solve.start_over_without_recovery(scene));
+        let settings = scene.settings;
+        let work_put_in = |solve: &Solve| if settings.audit_energy { solve.problem.work_put_in() } else { 0.0 };
+        let first_work: f64 = solves.iter().filter(|solve| solve.first_energy.is_some()).map(work_put_in).sum();
+        threads.each(solves, |_, solve, workspace| workspace.solve(solve, &settings.solver));
+        // The motion that is kept is paid for by what was done on its way, not on the way that recovery went.
+        report.work_put_in -= first_work;
+        for (island, solve) in solves.iter().enumerate() {
+            let Some(first_energy) = solve.first_energy else { continue };
             solve.report.add_to(report);
-            // The motion that is kept is paid for by what was done on its way, not on the way that recovery went.
-            report.work_put_in += first_work.map_or(0.0, |first| solve.problem.work_put_in() - first);
+            report.work_put_in += work_put_in(solve);
             let share = (first_energy / solve.problem.kinetic_energy()).sqrt().min(1.0);
-            for &member in self.islands.members(island) {
-                let active = self.active[member as usize];
+            for &member in islands.members(island) {
+                let active = active[member as usize];
                 let body = &mut scene.bodies[active.id];
                 if body.quarantined {
                     continue;
@@ -49,17 +53,15 @@ impl Integrator {
 }
 
 impl Solve {
-    /// Prepares the second solution, which goes on from where the first one ended, unless bodies parted so fast there that
-    /// another start is nearer. Answers the first one's energy of motion, J, if a second is wanted.
-    fn start_over_without_recovery(&mut self, scene: &Scene) -> Option<f64> {
+    /// Where recovery acts, prepares the second solution, which goes on from where the first one ended, unless bodies parted
+    /// so fast there that another start is nearer.
+    fn start_over_without_recovery(&mut self, scene: &Scene) {
         let contacts = &mut self.problem.terms.contacts;
-        let is_deep = contacts.iter().any(ContactTerm::recovers);
-        if is_deep {
+        if scene.settings.contact.recovery_speed > 0.0 && contacts.iter().any(ContactTerm::recovers) {
             contacts.iter_mut().for_each(|contact| contact.stop_recovery());
             (self.is_pending, self.problem.is_parting) = (true, true);
+            self.first_energy = Some(self.problem.kinetic_energy());
         }
-        let is_wanted = is_deep && scene.settings.contact.recovery_speed > 0.0;
-        is_wanted.then(|| self.problem.kinetic_energy())
     }
 
     /// By how much more energy the body has where recovery put it than where the second solution would, J.

@@ -1,10 +1,11 @@
 //! Solving on after the second look: islands are found anew with its points. What they touch is gathered again and goes on
 //! from where it was, what they do not touch is taken over as it is.
 
-use super::gather::{Spot, second_spots};
 use super::solver::SolveReport;
+use super::spots::{Active, Spot, second_spots};
 use super::step::{Integrator, Scene, Solve};
 use crate::collide::{Bodies, Candidates, Course, Detector};
+use crate::dof::BLOCK_RATES_MAX;
 
 /// Memory of solving on.
 #[derive(Default)]
@@ -16,12 +17,20 @@ pub(super) struct Onward {
     rates: Vec<f64>,
     /// Whether new points act on a body, by its index in the tick.
     touched: Vec<bool>,
-    /// Island of each body before.
-    islands: Vec<u32>,
+    /// Island of each body before, and its first block there.
+    places: Vec<(u32, u32)>,
     /// The solves before.
     solves: Vec<Solve>,
     /// What solves took that are no more.
     pub spent: SolveReport,
+}
+
+impl Onward {
+    /// Where the solve before ended for a body, from its first block on; `None` where nothing acted on it.
+    pub fn solution_of(&self, body: u32) -> Option<&[[f64; BLOCK_RATES_MAX]]> {
+        let (island, start) = self.places[body as usize];
+        Some(self.solves.get(island as usize)?.problem.solution(start as usize))
+    }
 }
 
 impl Integrator {
@@ -82,39 +91,32 @@ impl Integrator {
                 onward.touched[index as usize] = true;
             }
         }
-        onward.islands.clear();
-        onward.islands.extend((0..active.len() as u32).map(|index| islands.island_of(index)));
+        onward.places.clear();
+        let place = |(index, active): (u32, &Active)| (islands.island_of(index), active.start);
+        onward.places.extend((0..).zip(active.iter()).map(place));
         std::mem::swap(&mut onward.solves, solves);
         self.find_islands(scene);
         let mut onward = std::mem::take(&mut self.onward);
         for island in 0..self.islands.len() {
             self.go_on(island, &mut onward, scene);
         }
+        self.solve(scene, Some(&onward));
         self.onward = onward;
-        self.gather_potentials(scene);
-        self.solve(scene.settings);
     }
 
-    /// Takes an island over, or gathers its bodies again.
+    /// Takes an island over, or starts it anew.
     fn go_on(&mut self, island: usize, onward: &mut Onward, scene: &Scene) {
-        let Self { active, islands, solves, .. } = self;
-        let (members, solve) = (islands.members(island), &mut solves[island]);
+        let members = self.islands.members(island);
         if !members.iter().any(|&member| onward.touched[member as usize]) {
-            let before = onward.islands[members[0] as usize];
-            std::mem::swap(solve, &mut onward.solves[before as usize]);
-            solve.is_gathering = false;
-            return;
+            let (before, _) = onward.places[members[0] as usize];
+            return std::mem::swap(&mut self.solves[island], &mut onward.solves[before as usize]);
         }
-        solve.clear(scene.settings);
         for &member in members {
-            let active = &mut active[member as usize];
-            let (start, known) = (active.start as usize, solve.problem.len());
-            solve.take_in(active, scene);
-            let before = onward.solves.get_mut(onward.islands[member as usize] as usize);
-            solve.problem.start_from(known, before.as_ref().map(|before| before.problem.solution(start)));
-            if let Some(before) = before {
+            let (before, _) = onward.places[member as usize];
+            if let Some(before) = onward.solves.get_mut(before as usize) {
                 onward.spent.add_effort(&std::mem::take(&mut before.report));
             }
         }
+        self.seat(island, scene);
     }
 }

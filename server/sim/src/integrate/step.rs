@@ -1,31 +1,24 @@
 //! One integration of the whole world: bodies and potentials are sorted into islands, islands are solved, the answers
 //! are written to Q and Q'.
 
-use std::sync::{Mutex, PoisonError};
-
 use glam::DVec3;
-use rayon::iter::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 use slotmap::SlotMap;
 
 use super::StepReport;
-use super::gather::Active;
+use super::gather::Sources;
 use super::problem::{Problem, Unknown};
 use super::second_look::Onward;
 use super::solver::{SolveReport, Solvers, StoppedBecause};
-use super::threads;
+use super::spots::{Acting, Active};
+use super::threads::Threads;
 use crate::collide::{ContactPoint, SecondPoint};
 use crate::dof::{Body, BodyId, Placed};
 use crate::island::Islands;
 use crate::potential::contact::Outcome;
 use crate::potential::hold::{Joint, Memory};
-use crate::potential::{
-    AngleLimitId, BallJointId, DistanceLimitId, FixedJointId, HingeId, Potentials, RodId, SliderId, UniversalJointId,
-};
+use crate::potential::{PotentialId, Potentials};
 use crate::settings::{Settings, SolverSettings};
 use crate::state::State;
-
-/// Islands of fewer bodies than this in all are solved on the calling thread: waking another one costs more.
-const PARALLEL_BODIES_MIN: usize = 40;
 
 /// Everything that an integration reads and writes.
 pub(crate) struct Scene<'a> {
@@ -56,27 +49,25 @@ pub(super) struct Solve {
     /// Share of the tick's budget, block operations.
     budget: Option<u64>,
     pub report: SolveReport,
-    /// Whether it takes in potentials, and whether it is to be solved.
-    pub is_gathering: bool,
+    /// Whether it is to be gathered or solved.
     pub is_pending: bool,
+    /// Blocks of unknowns that its bodies have.
+    pub blocks: usize,
     /// Of the island, kg.
     pub mass: f64,
+    /// What acts in it: indices of [`Touching`](super::spots::Touching) and potentials.
+    pub touching: Vec<u32>,
+    pub potentials: Vec<PotentialId>,
     /// Index of each contact term among the world's contacts.
     pub contacts: Vec<u32>,
     /// Index of each contact term after those among the points of the second look.
     pub second: Vec<u32>,
     /// Index of the contact term of each rolling resistance.
     pub rolling: Vec<u32>,
-    pub rods: Vec<RodId>,
     /// Body and index of each rod of a figure.
     pub own_rods: Vec<(BodyId, u32)>,
-    pub ball_joints: Vec<BallJointId>,
-    pub hinges: Vec<HingeId>,
-    pub universal_joints: Vec<UniversalJointId>,
-    pub fixed_joints: Vec<FixedJointId>,
-    pub sliders: Vec<SliderId>,
-    pub distance_limits: Vec<DistanceLimitId>,
-    pub angle_limits: Vec<AngleLimitId>,
+    /// Energy of motion of the first solution where recovery has it solved a second time, J.
+    pub first_energy: Option<f64>,
 }
 
 /// The integrator with its memory.
@@ -85,27 +76,26 @@ pub(crate) struct Integrator {
     pub(super) islands: Islands,
     /// Bodies that take part, in order of serial.
     pub(super) active: Vec<Active>,
+    pub(super) acting: Acting,
     pub(super) solves: Vec<Solve>,
     pub(super) onward: Onward,
-    pool: Option<rayon::ThreadPool>,
-    /// One for the calling thread and for each of the pool.
-    pub(super) workspace: Workspace,
-    pool_workspaces: Vec<Mutex<Workspace>>,
+    pub(super) threads: Threads,
 }
 
 impl Integrator {
     /// An integrator that solves islands on `threads` threads.
     pub fn new(threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
-        let pool = threads::pool(threads)?;
-        let pool_threads = pool.as_ref().map_or(0, rayon::ThreadPool::current_num_threads);
-        let pool_workspaces = std::iter::repeat_with(Mutex::default).take(pool_threads).collect();
-        Ok(Self { pool, pool_workspaces, ..Self::default() })
+        Ok(Self { threads: Threads::new(threads)?, ..Self::default() })
     }
 
     /// Gathers and solves a tick. What comes of it is written by [`Integrator::scatter`].
     pub fn begin(&mut self, scene: &mut Scene) {
-        self.gather(scene);
-        self.solve(scene.settings);
+        self.onward.spent = SolveReport::default();
+        self.find_bodies(scene);
+        self.find_acting(scene);
+        self.find_islands(scene);
+        (0..self.islands.len()).for_each(|island| self.seat(island, scene));
+        self.solve(scene, None);
     }
 
     /// Solves one tick, and leaves everything as it was. Answers what the solver did.
@@ -132,13 +122,6 @@ impl Integrator {
         members.iter().map(|&member| self.active[member as usize].id)
     }
 
-    fn gather(&mut self, scene: &mut Scene) {
-        self.onward.spent = SolveReport::default();
-        self.gather_bodies(scene);
-        self.build_islands(scene);
-        self.gather_potentials(scene);
-    }
-
     fn sum_up(&self, report: &mut StepReport) {
         report.islands = self.islands.len();
         self.onward.spent.add_to(report);
@@ -147,23 +130,18 @@ impl Integrator {
         }
     }
 
-    pub(super) fn solve(&mut self, settings: &Settings) {
-        let solves = &mut self.solves[..self.islands.len()];
-        share_budget(solves, settings.solver.budget);
-        let solver = &settings.solver;
-        let blocks: usize = solves.iter().map(|solve| solve.problem.len()).sum();
-        match &self.pool {
-            Some(pool) if solves.len() > 1 && blocks >= PARALLEL_BODIES_MIN => {
-                let workspaces = &self.pool_workspaces;
-                let run = |solve: &mut Solve| {
-                    // Within the pool there is always an index, and its workspace is never asked for by another thread.
-                    let mine = &workspaces[rayon::current_thread_index().unwrap_or(0)];
-                    mine.lock().unwrap_or_else(PoisonError::into_inner).solve(solve, solver);
-                };
-                pool.install(|| solves.par_iter_mut().with_min_len(4).for_each(run));
-            }
-            _ => solves.iter_mut().for_each(|solve| self.workspace.solve(solve, solver)),
-        }
+    /// Gathers and solves every island that starts anew; `onward` has where those go on from that did before.
+    pub(super) fn solve(&mut self, scene: &Scene, onward: Option<&Onward>) {
+        self.hand_out(scene);
+        let Self { islands, active, acting, solves, threads, .. } = self;
+        let solves = &mut solves[..islands.len()];
+        let solver = &scene.settings.solver;
+        share_budget(solves, solver.budget);
+        let sources = Sources { scene, active, touching: &acting.touching, onward };
+        threads.each(solves, |island, solve, workspace| {
+            solve.gather(islands.members(island), sources);
+            workspace.solve(solve, solver);
+        });
     }
 
     /// Writes what the solver came to.
@@ -241,9 +219,7 @@ fn land(
 impl Workspace {
     pub fn solve(&mut self, solve: &mut Solve, settings: &SolverSettings) {
         let Solve { problem, budget, report, is_pending, .. } = solve;
-        if !std::mem::take(is_pending) {
-            return;
-        }
+        *is_pending = false;
         *report = if problem.unknowns.iter().any(Unknown::is_wide) {
             self.rigid.solve(problem, settings, *budget)
         } else {
@@ -253,24 +229,16 @@ impl Workspace {
 }
 
 impl Solve {
-    /// Starts a tick with an island of no bodies.
-    pub fn clear(&mut self, settings: &Settings) {
-        self.problem.clear(settings.dt, settings.field());
-        self.mass = 0.0;
-        (self.is_gathering, self.is_pending) = (true, true);
+    /// Starts an island anew, with bodies of so many blocks and nothing that acts on them.
+    pub fn clear(&mut self, blocks: usize) {
+        (self.is_pending, self.blocks, self.first_energy) = (true, blocks, None);
         self.report = SolveReport::default();
+        self.touching.clear();
+        self.potentials.clear();
         self.contacts.clear();
         self.second.clear();
         self.rolling.clear();
-        self.rods.clear();
         self.own_rods.clear();
-        self.ball_joints.clear();
-        self.hinges.clear();
-        self.universal_joints.clear();
-        self.fixed_joints.clear();
-        self.sliders.clear();
-        self.distance_limits.clear();
-        self.angle_limits.clear();
     }
 
     /// Hands back what potentials remember, and looks how well they hold.
@@ -295,31 +263,7 @@ impl Solve {
             let source = self.contacts[contact as usize];
             scene.contacts[source as usize].turn = finite_or_zero(term.final_anchor(dt, problem.pair(term)));
         }
-        let potentials = &mut *scene.potentials;
-        for (term, &id) in problem.terms.rods.iter().zip(&self.rods) {
-            potentials.rods[id].memory = account(problem, term, report);
-        }
-        for (term, &id) in problem.terms.ball_joints.iter().zip(&self.ball_joints) {
-            potentials.ball_joints[id].memory = account(problem, term, report);
-        }
-        for (term, &id) in problem.terms.hinges.iter().zip(&self.hinges) {
-            potentials.hinges[id].memory = account(problem, term, report);
-        }
-        for (term, &id) in problem.terms.universal_joints.iter().zip(&self.universal_joints) {
-            potentials.universal_joints[id].memory = account(problem, term, report);
-        }
-        for (term, &id) in problem.terms.fixed_joints.iter().zip(&self.fixed_joints) {
-            potentials.fixed_joints[id].memory = account(problem, term, report);
-        }
-        for (term, &id) in problem.terms.sliders.iter().zip(&self.sliders) {
-            potentials.sliders[id].memory = account(problem, term, report);
-        }
-        for (term, &id) in problem.terms.distance_limits.iter().zip(&self.distance_limits) {
-            potentials.distance_limits[id].memory = account(problem, term, report);
-        }
-        for (term, &id) in problem.terms.angle_limits.iter().zip(&self.angle_limits) {
-            potentials.angle_limits[id].memory = account(problem, term, report);
-        }
+        self.write_back_joints(scene.potentials, report);
         for (term, &(body, rod)) in problem.terms.own_rods.iter().zip(&self.own_rods) {
             let figure = scene.bodies[body].figure.as_mut();
             if let Some(memory) = figure.and_then(|figure| figure.rods.get_mut(rod as usize)) {
@@ -328,6 +272,40 @@ impl Solve {
         }
         for term in &problem.terms.axles {
             report.worst_joint_gap = report.worst_joint_gap.max(term.gap(problem.pair(term)));
+        }
+    }
+
+    /// What joints remember: there is a term for each on the list, in its order.
+    fn write_back_joints(&self, potentials: &mut Potentials, report: &mut StepReport) {
+        let (problem, terms) = (&self.problem, &self.problem.terms);
+        let (mut rods, mut ball_joints, mut hinges) =
+            (terms.rods.iter(), terms.ball_joints.iter(), terms.hinges.iter());
+        let (mut universal, mut fixed) = (terms.universal_joints.iter(), terms.fixed_joints.iter());
+        let (mut sliders, mut distances) = (terms.sliders.iter(), terms.distance_limits.iter());
+        let mut angles = terms.angle_limits.iter();
+        for &what in &self.potentials {
+            let (memory, new) = match what {
+                PotentialId::Rod(id) => (&mut potentials.rods[id].memory, next(problem, &mut rods, report)),
+                PotentialId::BallJoint(id) => {
+                    (&mut potentials.ball_joints[id].memory, next(problem, &mut ball_joints, report))
+                }
+                PotentialId::Hinge(id) => (&mut potentials.hinges[id].memory, next(problem, &mut hinges, report)),
+                PotentialId::UniversalJoint(id) => {
+                    (&mut potentials.universal_joints[id].memory, next(problem, &mut universal, report))
+                }
+                PotentialId::FixedJoint(id) => {
+                    (&mut potentials.fixed_joints[id].memory, next(problem, &mut fixed, report))
+                }
+                PotentialId::Slider(id) => (&mut potentials.sliders[id].memory, next(problem, &mut sliders, report)),
+                PotentialId::DistanceLimit(id) => {
+                    (&mut potentials.distance_limits[id].memory, next(problem, &mut distances, report))
+                }
+                PotentialId::AngleLimit(id) => {
+                    (&mut potentials.angle_limits[id].memory, next(problem, &mut angles, report))
+                }
+                _ => continue,
+            };
+            *memory = new.unwrap_or(*memory);
         }
     }
 
@@ -343,12 +321,21 @@ impl Solve {
 
 /// Gives every island the share of `budget` that its bodies and contacts are of all.
 fn share_budget(solves: &mut [Solve], budget: Option<u64>) {
-    let size = |solve: &Solve| (solve.problem.len() + solve.contacts.len()) as u128;
+    let size = |solve: &Solve| (solve.blocks + solve.contacts.len()) as u128;
     let all: u128 = solves.iter().map(size).sum();
     for solve in solves {
         // No share is larger than the whole, so it fits.
         solve.budget = budget.map(|budget| (u128::from(budget) * size(solve) / all.max(1)) as u64);
     }
+}
+
+/// What the next joint of a type remembers.
+fn next<'a, J: Joint + 'a>(
+    problem: &Problem,
+    joints: &mut impl Iterator<Item = &'a J>,
+    report: &mut StepReport,
+) -> Option<Memory> {
+    joints.next().map(|joint| account(problem, joint, report))
 }
 
 /// Counts a joint in; answers what it remembers.

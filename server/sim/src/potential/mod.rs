@@ -79,6 +79,24 @@ impl Anchor {
     }
 }
 
+/// Handle of a potential of any type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PotentialId {
+    Spring(SpringId),
+    Rod(RodId),
+    BallJoint(BallJointId),
+    Hinge(HingeId),
+    UniversalJoint(UniversalJointId),
+    FixedJoint(FixedJointId),
+    Slider(SliderId),
+    DistanceLimit(DistanceLimitId),
+    AngleLimit(AngleLimitId),
+    Motor(MotorId),
+    Axle(AxleId),
+    AntiRollBar(AntiRollBarId),
+    Pd(PdId),
+}
+
 /// The world's potentials, apart from contacts, which live for one tick.
 #[derive(Default)]
 pub(crate) struct Potentials {
@@ -99,20 +117,39 @@ pub(crate) struct Potentials {
 }
 
 impl Potentials {
-    /// Both ends of every potential that takes part; angle limits, motors and anti-roll bars share those of their joints.
-    pub fn pairs(&self) -> impl Iterator<Item = [Anchor; 2]> + '_ {
-        let springs = self.springs.awake().map(|(_, s)| [s.a, s.b]);
-        let rods = self.rods.awake().map(|(_, r)| [r.desc.a, r.desc.b]);
-        let ball_joints = self.ball_joints.awake().map(|(_, j)| [j.desc.a, j.desc.b]);
-        let hinges = self.hinges.awake().map(|(_, h)| [h.desc.desc.a, h.desc.desc.b]);
-        let universal_joints = self.universal_joints.awake().map(|(_, j)| [j.desc.a, j.desc.b]);
-        let fixed_joints = self.fixed_joints.awake().map(|(_, j)| [j.desc.desc.a, j.desc.desc.b]);
-        let sliders = self.sliders.awake().map(|(_, s)| [s.desc.desc.a, s.desc.desc.b]);
-        let limits = self.distance_limits.awake().map(|(_, l)| [l.desc.a, l.desc.b]);
-        let axles = self.axles.awake().map(|(_, a)| [a.chassis, a.wheel].map(|id| Anchor::body(id, DVec3::ZERO)));
-        let pds = self.pds.awake().map(|(_, (pd, _))| [pd.at, Anchor::world(DVec3::ZERO)]);
-        let joints = ball_joints.chain(hinges).chain(universal_joints).chain(fixed_joints).chain(sliders);
-        springs.chain(rods).chain(joints).chain(limits).chain(axles).chain(pds)
+    /// Every potential that takes part, with the two ends that it acts between; angle limits, motors and anti-roll bars
+    /// share those of their joints.
+    pub fn awake(&self) -> impl Iterator<Item = (PotentialId, [Anchor; 2])> + '_ {
+        use PotentialId as Id;
+        let of_axle = |axle: &AxleDesc| [axle.chassis, axle.wheel].map(|id| Anchor::body(id, DVec3::ZERO));
+        let springs = self.springs.awake().map(|(id, s)| (Id::Spring(id), [s.a, s.b]));
+        let rods = self.rods.awake().map(|(id, r)| (Id::Rod(id), [r.desc.a, r.desc.b]));
+        let ball_joints = self.ball_joints.awake().map(|(id, j)| (Id::BallJoint(id), [j.desc.a, j.desc.b]));
+        let hinges = self.hinges.awake().map(|(id, h)| (Id::Hinge(id), [h.desc.desc.a, h.desc.desc.b]));
+        let universal = self.universal_joints.awake().map(|(id, j)| (Id::UniversalJoint(id), [j.desc.a, j.desc.b]));
+        let fixed = self.fixed_joints.awake().map(|(id, j)| (Id::FixedJoint(id), [j.desc.desc.a, j.desc.desc.b]));
+        let sliders = self.sliders.awake().map(|(id, s)| (Id::Slider(id), [s.desc.desc.a, s.desc.desc.b]));
+        let distances = self.distance_limits.awake().map(|(id, l)| (Id::DistanceLimit(id), [l.desc.a, l.desc.b]));
+        let angles = self.angle_limits.awake().filter_map(|(id, limit)| {
+            let hinge = &self.hinges.get(limit.desc.hinge)?.desc.desc;
+            Some((Id::AngleLimit(id), [hinge.a, hinge.b]))
+        });
+        let motors = self.motors.awake().filter_map(|(id, m)| Some((Id::Motor(id), self.ends_of(m.joint)?)));
+        let axles = self.axles.awake().map(move |(id, axle)| (Id::Axle(id), of_axle(axle)));
+        let bars = self.anti_roll_bars.awake();
+        let bars =
+            bars.filter_map(move |(id, bar)| Some((Id::AntiRollBar(id), of_axle(self.axles.get(bar.axles[0])?))));
+        let pds = self.pds.awake().map(|(id, (pd, _))| (Id::Pd(id), [pd.at, Anchor::world(DVec3::ZERO)]));
+        let joints = ball_joints.chain(hinges).chain(universal).chain(fixed).chain(sliders);
+        springs
+            .chain(rods)
+            .chain(joints)
+            .chain(distances)
+            .chain(angles)
+            .chain(motors)
+            .chain(axles)
+            .chain(bars)
+            .chain(pds)
     }
 
     /// From now on those take part of which a body is awake.
