@@ -31,6 +31,7 @@ pub mod potential;
 mod settings;
 mod sleep;
 mod state;
+mod threads;
 mod world;
 
 pub use collide::{

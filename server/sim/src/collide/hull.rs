@@ -155,8 +155,8 @@ impl Hull {
     }
 
     fn seen<'a>(&self, collider: &'a Collider) -> Moving<'a> {
-        let Self { placed: Placed { serial, .. }, owner, pose, twist, spread, flies, pivot, bend, .. } = *self;
-        Moving { serial, owner, collider, pose, twist, spread, flies, pivot, bend }
+        let Self { placed: Placed { serial, .. }, pose, twist, spread, flies, pivot, bend, .. } = *self;
+        Moving { serial, collider, pose, twist, spread, flies, pivot, bend }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Collision detection: which DOF are incompatible, and where.
 //!
 //! Once a tick, at Q0, with margins that cover the tick's motion, and again (`second_look`) where the solver puts what
-//! moves far: three `trees` of k-DOPs prune, `narrow_phase` finds the
+//! moves far: three `trees` of k-DOPs prune, `narrow_phase` keeps the pairs, `fine_phase` finds their
 //! points. What comes out are contact points; [`potential::contact`](crate::potential) makes potentials of them.
 
 mod boxes;
@@ -11,6 +11,7 @@ mod compound;
 mod convex;
 mod core;
 mod embedded_hull;
+mod fine_phase;
 mod gjk;
 mod groups;
 mod half_space;
@@ -49,12 +50,15 @@ use crate::dof::{BodyId, Placed, Pose, Twist};
 use crate::error::{SimError, require_rotation, require_vector};
 use crate::potential::restitution::Blow;
 use crate::settings::Settings;
+use crate::threads::Threads;
 use collision::{Closest, Touch};
+use fine_phase::may_reach;
 pub(crate) use hull::Bodies;
 use kdop::Kdop;
 use manifold::ManifoldPoint;
 use material::MaterialTable;
-use narrow_phase::{Key, NarrowPhase};
+use narrow_phase::{Key, NarrowPhase, Other};
+use second_look::Glances;
 pub(crate) use second_look::{Candidates, Course, SecondPoint};
 use trees::Trees;
 
@@ -103,8 +107,6 @@ pub struct ContactView {
 pub(crate) struct Moving<'a> {
     /// Of the collider.
     pub serial: u32,
-    /// Serial of the body that it is on.
-    pub owner: u32,
     pub collider: &'a Collider,
     pub pose: Pose,
     pub twist: Twist,
@@ -239,6 +241,8 @@ pub(crate) struct Detector {
     pub second: Vec<SecondPoint>,
     /// How wide those of earlier looks believe to be, m, in order of pair.
     beliefs: Vec<(Key, f64)>,
+    /// Pairs that the second look looks at.
+    glances: Glances,
     /// What there is to tell of pairs in this tick, in order of pair.
     touches: Vec<Touch>,
     /// Counts detections.
@@ -371,10 +375,26 @@ impl Detector {
 
     /// Finds the contacts of everything that is awake, and when called again, of what woke since. Answers whether anything
     /// sleeping was touched: [`Detector::touched`] has it.
-    pub fn meet(&mut self, bodies: Bodies, settings: &Settings) -> bool {
+    pub fn meet(&mut self, bodies: Bodies, settings: &Settings, threads: &Threads) -> bool {
         self.trees.update(bodies, settings);
-        self.meet_bodies(bodies, settings);
-        self.meet_statics(bodies, settings);
+        self.ask_about_bodies(bodies, settings);
+        self.ask_about_statics(bodies, settings);
+        let Self { trees, statics, materials, narrow_phase, touched, .. } = self;
+        touched.extend(narrow_phase.answer(threads, |question, fine_phase| {
+            let Some(a) = trees.hull(question.hull).moving(bodies) else { return };
+            let surface = |collider: &Collider| materials.contact(a.collider.material(), collider.material());
+            match question.other {
+                Other::Hull(hull, _) => {
+                    let Some(b) = trees.hull(hull).moving(bodies) else { return };
+                    question.wakes = fine_phase.bodies(&mut question.pair, [&a, &b], surface(b.collider), settings);
+                }
+                Other::Piece(id) => {
+                    let Static { serial, ref collider, pose, .. } = statics[id];
+                    let (pair, piece) = (&mut question.pair, (serial, collider, pose));
+                    fine_phase.with_static(pair, &a, piece, surface(collider), settings);
+                }
+            }
+        }));
         !self.touched.is_empty()
     }
 
@@ -411,28 +431,35 @@ impl Detector {
         self.statics.get(id).map_or(Some(Vec::new()), |piece| piece.piece.map(|key| self.trees.sleepers_around(key)))
     }
 
-    /// The fine phase of all pairs of bodies that may touch.
-    fn meet_bodies(&mut self, bodies: Bodies, settings: &Settings) {
-        let excludes = |a: u32, b: u32| self.excluded.binary_search(&(a.min(b), a.max(b))).is_ok();
-        for (pair, sleeper) in self.trees.pairs() {
-            let [Some(a), Some(b)] = pair.map(|hull| hull.moving(bodies)) else { continue };
-            if a.collider.meets(b.collider) && !excludes(a.owner, b.owner) {
-                let surface = self.materials.contact(a.collider.material(), b.collider.material());
-                let touches = self.narrow_phase.bodies(&a, &b, surface, settings);
-                self.touched.extend(sleeper.filter(|_| touches));
+    /// Takes up all pairs of bodies that may touch.
+    fn ask_about_bodies(&mut self, bodies: Bodies, settings: &Settings) {
+        let Self { trees, excluded, narrow_phase, .. } = self;
+        for (pair, sleeper) in trees.pairs() {
+            let [a, b] = pair.map(|key| trees.hull(key));
+            let (Some(of_a), Some(of_b)) = (a.collider(bodies), b.collider(bodies)) else { continue };
+            if of_a.meets(of_b) && !is_excluded(excluded, a.owner, b.owner) {
+                let key = (a.placed.serial, Partner::Body(b.placed.serial));
+                let is_sensor = of_a.is_sensor() || of_b.is_sensor();
+                narrow_phase.ask(key, (pair[0], Other::Hull(pair[1], sleeper)), is_sensor, settings);
             }
         }
     }
 
-    /// The fine phase of all bodies with the static geometry that they may touch.
-    fn meet_statics(&mut self, bodies: Bodies, settings: &Settings) {
-        let unbounded = self.trees.arrivals().flat_map(|hull| self.unbounded.iter().map(move |&id| (hull, id)));
-        for (hull, id) in self.trees.pairs_with_fixed().chain(unbounded) {
-            let (Some(body), piece) = (hull.moving(bodies), &self.statics[id]) else { continue };
-            if body.collider.meets(&piece.collider) {
-                let surface = self.materials.contact(body.collider.material(), piece.collider.material());
-                let at = (piece.serial, &piece.collider, piece.pose);
-                self.narrow_phase.with_static(&body, at, surface, settings);
+    /// Takes up all bodies with the static geometry that they may touch.
+    fn ask_about_statics(&mut self, bodies: Bodies, settings: &Settings) {
+        let Self { trees, statics, unbounded, narrow_phase, .. } = self;
+        let unbounded = trees.arrivals().flat_map(|hull| unbounded.iter().map(move |&id| (hull, id)));
+        let unbounded = unbounded.filter(|&(hull, id)| {
+            let body = trees.hull(hull).moving(bodies);
+            body.is_some_and(|body| may_reach(&body, (&statics[id].collider, statics[id].pose), settings))
+        });
+        for (hull, id) in trees.pairs_with_fixed().chain(unbounded) {
+            let (body, piece) = (trees.hull(hull), &statics[id]);
+            let Some(collider) = body.collider(bodies) else { continue };
+            if collider.meets(&piece.collider) {
+                let key = (body.placed.serial, Partner::Static(piece.serial));
+                let is_sensor = collider.is_sensor() || piece.collider.is_sensor();
+                narrow_phase.ask(key, (hull, Other::Piece(id)), is_sensor, settings);
             }
         }
     }
@@ -441,4 +468,9 @@ impl Detector {
     pub fn remember(&mut self) {
         self.narrow_phase.remember(&self.contacts);
     }
+}
+
+/// Whether two bodies never collide, by serial.
+fn is_excluded(excluded: &[(u32, u32)], a: u32, b: u32) -> bool {
+    excluded.binary_search(&(a.min(b), a.max(b))).is_ok()
 }

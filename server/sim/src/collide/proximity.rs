@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 
-use super::narrow_phase::NarrowPhase;
+use super::fine_phase::FinePhase;
 use super::shape::Collider;
 use crate::dof::Pose;
 
@@ -31,7 +31,7 @@ pub struct At<'a> {
 /// The nearest points of two convex colliders, or the deepest where they overlap: what contacts are made of.
 /// `None` where they are farther apart than `within`, m.
 pub fn proximity(a: At, b: At, within: f64) -> Option<Proximity> {
-    NarrowPhase::default().proximity(
+    FinePhase::default().proximity(
         (a.collider, Pose { position: a.position, rotation: a.rotation }),
         (b.collider, Pose { position: b.position, rotation: b.rotation }),
         within,

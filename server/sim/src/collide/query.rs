@@ -5,8 +5,8 @@
 
 use glam::{DMat3, DVec3};
 
+use super::fine_phase::FinePhase;
 use super::hull::{self, Bodies};
-use super::narrow_phase::NarrowPhase;
 use super::shape::{Collider, Shape};
 use super::trees::Found;
 use super::{CollisionObject, Detector, Groups};
@@ -178,13 +178,13 @@ impl Detector {
 struct Probe {
     at: DVec3,
     point: Collider,
-    fine_phase: NarrowPhase,
+    fine_phase: FinePhase,
 }
 
 impl Probe {
     fn new(at: DVec3) -> Self {
         let point = Collider::new(Shape::Ball { radius: POINT }, 0.0);
-        Self { at, point, fine_phase: NarrowPhase::default() }
+        Self { at, point, fine_phase: FinePhase::default() }
     }
 
     /// Distance from the point to a collider, negative inside, and the unit vector out of its surface; `None` beyond

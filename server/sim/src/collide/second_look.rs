@@ -8,13 +8,15 @@
 
 use glam::DVec3;
 
+use super::fine_phase::FinePhase;
 use super::hull::{Bodies, Hull, Stride};
 use super::material::MaterialTable;
-use super::narrow_phase::{Key, NarrowPhase};
+use super::narrow_phase::{Key, Other};
 use super::shape::{Collider, Shape};
-use super::{ContactPoint, Detector, EmbeddedHull, Foot, Partner};
+use super::{ContactPoint, Detector, EmbeddedHull, Foot, Partner, Static, is_excluded};
 use crate::dof::{FigureBody, Pose, Twist};
 use crate::settings::Settings;
+use crate::threads::Threads;
 
 /// A pair is looked at again where one side moves by more than this share of its bounding radius.
 const MOVED: f64 = 0.05;
@@ -57,7 +59,6 @@ pub(crate) struct Candidates<'a> {
 /// One of a pair.
 struct Side<'a> {
     serial: u32,
-    owner: u32,
     collider: &'a Collider,
     pose: Pose,
     carrier: Carrier<'a>,
@@ -93,7 +94,7 @@ impl<'a> Candidates<'a> {
     fn side(&'a self, hull: &'a Hull, dt: f64) -> Option<Side<'a>> {
         let placed = &hull.placed;
         let body = self.bodies.bodies.get(placed.body)?;
-        let (serial, owner) = (placed.serial, hull.owner);
+        let serial = placed.serial;
         let collider = self.bodies.collider(placed)?;
         let (collider, pose, carrier) = match (*self.courses.get(body.index as usize)?, &body.figure) {
             (Course::Body(pose, twist), _) => {
@@ -115,7 +116,7 @@ impl<'a> Candidates<'a> {
             (Course::Figure(_), None) => return None,
         };
         let is_sane = pose.position.is_finite() && pose.rotation.is_finite();
-        is_sane.then_some(Side { serial, owner, collider, pose, carrier })
+        is_sane.then_some(Side { serial, collider, pose, carrier })
     }
 
     /// How the tick moves a hull.
@@ -186,52 +187,122 @@ impl Detector {
 
     /// Looks again at the pairs of the tick that move far, where `candidates` has them. Answers whether points were added
     /// to [`Detector::second`], where those of earlier looks stay.
-    pub fn look_again(&mut self, candidates: &Candidates, settings: &Settings) -> bool {
-        let Self { trees, excluded, materials, statics, unbounded, contacts, second, narrow_phase, beliefs, .. } = self;
-        let (known, dt) = (second.len(), settings.dt);
+    pub fn look_again(&mut self, candidates: &Candidates, settings: &Settings, threads: &Threads) -> bool {
+        self.glances.clear();
+        self.pick_bodies();
+        self.pick_statics();
+        let Self { trees, materials, statics, contacts, second, narrow_phase, beliefs, glances, .. } = self;
         beliefs.clear();
         beliefs.extend(second.iter().map(|SecondPoint { contact, .. }| ((contact.a, contact.b), contact.believed_gap)));
         beliefs.sort_unstable_by_key(|&(key, _)| key);
-        let mut look = Look { contacts, second, beliefs, narrow_phase, settings };
-        let excludes = |a: u32, b: u32| excluded.binary_search(&(a.min(b), a.max(b))).is_ok();
-        for pair in trees.pairs_awake().filter(|pair| pair.iter().any(|hull| hull.stride.is_far)) {
-            let [Some(a), Some(b)] = pair.map(|hull| candidates.side(hull, dt)) else { continue };
-            if !excludes(a.owner, b.owner) {
-                let partner = Partner::Body(b.serial);
-                look.at_pair([a, b], partner, materials);
+        let look = Look { contacts, beliefs, materials, settings };
+        let is_worth_it = glances.len() >= PARALLEL_GLANCES_MIN;
+        threads.each(glances.used_mut(), narrow_phase.workspaces(), is_worth_it, |_, glance, fine_phase| {
+            let Some(a) = candidates.side(trees.hull(glance.hull), settings.dt) else { return };
+            match glance.other {
+                Other::Hull(hull, _) => {
+                    let Some(b) = candidates.side(trees.hull(hull), settings.dt) else { return };
+                    let partner = Partner::Body(b.serial);
+                    look.at_pair([a, b], partner, fine_phase, &mut glance.found);
+                }
+                Other::Piece(id) => {
+                    let Static { serial, ref collider, pose, .. } = statics[id];
+                    let carrier = Carrier::Frame(pose.position, Twist::REST);
+                    let b = Side { serial, collider, pose, carrier };
+                    look.at_pair([a, b], Partner::Static(serial), fine_phase, &mut glance.found);
+                }
+            }
+        });
+        let known = second.len();
+        glances.used_mut().iter_mut().for_each(|glance| second.append(&mut glance.found));
+        second.len() > known
+    }
+
+    /// Picks the pairs of bodies of which one moves far.
+    fn pick_bodies(&mut self) {
+        let Self { trees, excluded, glances, .. } = self;
+        for pair in trees.pairs_awake() {
+            let [a, b] = pair.map(|key| trees.hull(key));
+            if (a.stride.is_far || b.stride.is_far) && !is_excluded(excluded, a.owner, b.owner) {
+                glances.take(pair[0], Other::Hull(pair[1], None));
             }
         }
+    }
+
+    /// Picks the bodies that move far past static geometry.
+    fn pick_statics(&mut self) {
+        let Self { trees, statics, unbounded, glances, .. } = self;
         let unbounded = trees.awake().flat_map(|hull| unbounded.iter().map(move |&id| (hull, id)));
         for (hull, id) in trees.pairs_awake_with_fixed().chain(unbounded) {
-            let piece = &statics[id];
+            let stride = trees.hull(hull).stride;
             // Gaps to a half-space are linear in all motion but turns.
-            let is_flat = matches!(piece.collider.shape(), Shape::HalfSpace { .. });
-            if !(if is_flat { hull.stride.turns_far } else { hull.stride.is_far }) {
-                continue;
+            let is_flat = matches!(statics[id].collider.shape(), Shape::HalfSpace { .. });
+            if if is_flat { stride.turns_far } else { stride.is_far } {
+                glances.take(hull, Other::Piece(id));
             }
-            let Some(a) = candidates.side(hull, dt) else { continue };
-            let (serial, collider, pose) = (piece.serial, &piece.collider, piece.pose);
-            let carrier = Carrier::Frame(pose.position, Twist::REST);
-            let b = Side { serial, owner: serial, collider, pose, carrier };
-            look.at_pair([a, b], Partner::Static(serial), materials);
         }
-        second.len() > known
     }
 }
 
-/// What a look reads and writes.
+/// Fewer pairs than this are looked at by the calling thread: waking another one costs more.
+const PARALLEL_GLANCES_MIN: usize = 32;
+
+/// A pair that is looked at again.
+struct Glance {
+    /// Hull of the first body.
+    hull: u32,
+    other: Other,
+    found: Vec<SecondPoint>,
+}
+
+/// The pairs of a look.
+#[derive(Default)]
+pub(super) struct Glances {
+    list: Vec<Glance>,
+    /// Those of this look; those after them keep their memory for later.
+    used: usize,
+}
+
+impl Glances {
+    fn clear(&mut self) {
+        self.used = 0;
+    }
+
+    fn len(&self) -> usize {
+        self.used
+    }
+
+    fn used_mut(&mut self) -> &mut [Glance] {
+        &mut self.list[..self.used]
+    }
+
+    fn take(&mut self, hull: u32, other: Other) {
+        match self.list.get_mut(self.used) {
+            Some(glance) => (glance.hull, glance.other) = (hull, other),
+            None => self.list.push(Glance { hull, other, found: Vec::new() }),
+        }
+        self.used += 1;
+    }
+}
+
+/// What a look reads.
 struct Look<'a> {
     contacts: &'a [ContactPoint],
-    second: &'a mut Vec<SecondPoint>,
     /// How wide the points of earlier looks believe to be, m, in order of pair.
     beliefs: &'a [(Key, f64)],
-    narrow_phase: &'a mut NarrowPhase,
+    materials: &'a MaterialTable,
     settings: &'a Settings,
 }
 
 impl Look<'_> {
     /// Adds the points of a pair, if it is deeper than its points believe.
-    fn at_pair(&mut self, [a, b]: [Side; 2], partner: Partner, materials: &MaterialTable) {
+    fn at_pair(
+        &self,
+        [a, b]: [Side; 2],
+        partner: Partner,
+        fine_phase: &mut FinePhase,
+        points_found: &mut Vec<SecondPoint>,
+    ) {
         let pushes = a.collider.meets(b.collider) && !a.collider.is_sensor() && !b.collider.is_sensor();
         let key = (a.serial, partner);
         let start = self.contacts.partition_point(|contact| (contact.a, contact.b) < key);
@@ -242,13 +313,13 @@ impl Look<'_> {
         let added = &self.beliefs[self.beliefs.partition_point(|&(other, _)| other < key)..];
         let added = added.iter().take_while(|(other, _)| *other == key).map(|&(_, gap)| gap);
         let believed = points().map(|contact| contact.believed_gap).chain(added).fold(0.0, f64::min);
-        let found = self.narrow_phase.overlap((a.collider, a.pose), (b.collider, b.pose), self.settings.contact.margin);
+        let found = fine_phase.overlap((a.collider, a.pose), (b.collider, b.pose), self.settings.contact.margin);
         if found.iter().all(|(_, point)| point.gap >= believed - DEEPER) {
             return;
         }
         let dt = self.settings.dt;
         let start_depth = -points().map(|contact| contact.gap).fold(0.0, f64::min);
-        let surface = materials.contact(a.collider.material(), b.collider.material());
+        let surface = self.materials.contact(a.collider.material(), b.collider.material());
         let partner_moves = matches!(partner, Partner::Body(_));
         for (normal, point) in found {
             let hold = |side: &Side, outward: DVec3| side.hold(point.position, outward, point.gap, dt);
@@ -261,7 +332,7 @@ impl Look<'_> {
             let moved = dt * (of_b.twist.at(arms[1]) - of_a.twist.at(arms[0]));
             let (contact, start_gap) =
                 (ContactPoint::fresh(key, *normal, point, surface), point.gap - moved.dot(*normal));
-            self.second.push(SecondPoint { contact, feet: [of_a.foot, of_b.foot], arms, start_gap, start_depth });
+            points_found.push(SecondPoint { contact, feet: [of_a.foot, of_b.foot], arms, start_gap, start_depth });
         }
     }
 }

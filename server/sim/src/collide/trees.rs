@@ -18,7 +18,7 @@ use crate::settings::Settings;
 type Tree = KdopTree<SLABS>;
 
 /// Two hulls, or a hull and a piece of static geometry, by their keys.
-type Pair = [u32; 2];
+pub(super) type Pair = [u32; 2];
 
 /// Where a hull is kept.
 #[derive(Clone, Copy)]
@@ -241,18 +241,18 @@ impl Trees {
     }
 
     /// A hull.
-    fn hull(&self, key: u32) -> &Hull {
+    pub fn hull(&self, key: u32) -> &Hull {
         &self.entries[key as usize].hull
     }
 
     /// Hulls that arrived in this round.
-    pub fn arrivals(&self) -> impl Iterator<Item = &Hull> {
-        self.arrivals.iter().map(|&key| self.hull(key))
+    pub fn arrivals(&self) -> impl Iterator<Item = u32> {
+        self.arrivals.iter().copied()
     }
 
     /// All hulls that are awake.
-    pub fn awake(&self) -> impl Iterator<Item = &Hull> {
-        self.awake.iter().map(|&key| self.hull(key))
+    pub fn awake(&self) -> impl Iterator<Item = u32> {
+        self.awake.iter().copied()
     }
 
     /// Tells every hull that is awake how the tick moves it. Answers whether one moves far.
@@ -267,38 +267,48 @@ impl Trees {
     }
 
     /// All pairs of hulls that are awake and whose bounds overlap, whatever the round.
-    pub fn pairs_awake(&self) -> impl Iterator<Item = [&Hull; 2]> {
-        self.near.iter().map(|pair| pair.map(|key| self.hull(key))).filter(|[a, b]| a.bounds.overlaps(&b.bounds))
+    pub fn pairs_awake(&self) -> impl Iterator<Item = Pair> {
+        self.near.iter().copied().filter(|&pair| self.overlap(pair))
     }
 
     /// All hulls that are awake and pieces of static geometry whose bounds overlap, whatever the round.
-    pub fn pairs_awake_with_fixed(&self) -> impl Iterator<Item = (&Hull, StaticId)> {
-        let pairs = self.near_fixed.iter().map(|&[hull, piece]| (self.hull(hull), &self.pieces[piece as usize]));
-        pairs.filter(|(hull, piece)| hull.bounds.overlaps(&piece.bounds)).map(|(hull, piece)| (hull, piece.id))
+    pub fn pairs_awake_with_fixed(&self) -> impl Iterator<Item = (u32, StaticId)> {
+        self.near_fixed.iter().filter_map(|&pair| self.overlap_with_fixed(pair))
     }
 
     /// Pairs of hulls of this round whose bounds overlap, the smaller serial first; and of such hulls with sleepers, whose
     /// body is told.
-    pub fn pairs(&self) -> impl Iterator<Item = ([&Hull; 2], Option<BodyId>)> {
-        let entry = |key: u32| &self.entries[key as usize];
-        let arrives = move |key: u32| entry(key).round == self.round;
-        let near = self.near.iter().filter(move |pair| pair.iter().all(|&key| arrives(key)));
-        let near = near.map(move |pair| (pair.map(|key| self.hull(key)), None));
+    pub fn pairs(&self) -> impl Iterator<Item = (Pair, Option<BodyId>)> {
+        let near = self.near.iter().filter(|pair| pair.iter().all(|&key| self.arrives(key)));
+        let near = near.map(|&pair| (pair, None));
+        let sleeping = self.near_sleeping.iter();
         let sleeping =
-            self.near_sleeping.iter().filter(move |&&[hull, sleeper]| arrives(hull) && entry(sleeper).sleeps());
-        let sleeping = sleeping.map(move |pair| {
-            let [a, b] = pair.map(|key| self.hull(key));
-            (if a.placed.serial < b.placed.serial { [a, b] } else { [b, a] }, Some(b.placed.body))
+            sleeping.filter(|&&[hull, sleeper]| self.arrives(hull) && self.entries[sleeper as usize].sleeps());
+        let sleeping = sleeping.map(|&[a, b]| {
+            let [of_a, of_b] = [a, b].map(|key| self.hull(key).placed);
+            (if of_a.serial < of_b.serial { [a, b] } else { [b, a] }, Some(of_b.body))
         });
-        near.chain(sleeping).filter(|([a, b], _)| a.bounds.overlaps(&b.bounds))
+        near.chain(sleeping).filter(|&(pair, _)| self.overlap(pair))
     }
 
     /// Hulls of this round and pieces of static geometry whose bounds overlap, in order of serials.
-    pub fn pairs_with_fixed(&self) -> impl Iterator<Item = (&Hull, StaticId)> {
-        let arrives = |key: u32| self.entries[key as usize].round == self.round;
-        let pairs = self.near_fixed.iter().filter(move |pair| arrives(pair[0]));
-        let pairs = pairs.map(|&[hull, piece]| (self.hull(hull), &self.pieces[piece as usize]));
-        pairs.filter(|(hull, piece)| hull.bounds.overlaps(&piece.bounds)).map(|(hull, piece)| (hull, piece.id))
+    pub fn pairs_with_fixed(&self) -> impl Iterator<Item = (u32, StaticId)> {
+        let pairs = self.near_fixed.iter().filter(|pair| self.arrives(pair[0]));
+        pairs.filter_map(|&pair| self.overlap_with_fixed(pair))
+    }
+
+    fn arrives(&self, key: u32) -> bool {
+        self.entries[key as usize].round == self.round
+    }
+
+    fn overlap(&self, pair: Pair) -> bool {
+        let [a, b] = pair.map(|key| self.hull(key));
+        a.bounds.overlaps(&b.bounds)
+    }
+
+    fn overlap_with_fixed(&self, [hull, piece]: Pair) -> Option<(u32, StaticId)> {
+        let piece = &self.pieces[piece as usize];
+        self.hull(hull).bounds.overlaps(&piece.bounds).then_some((hull, piece.id))
     }
 
     /// Hands `found` all whose bounds overlap `bounds`, in no order.

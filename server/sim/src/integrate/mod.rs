@@ -26,7 +26,6 @@ mod second_look;
 mod solver;
 mod spots;
 mod step;
-mod threads;
 mod vector;
 mod wheels;
 

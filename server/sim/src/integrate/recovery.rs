@@ -17,22 +17,21 @@ use glam::DVec3;
 impl Integrator {
     /// After Q and Q' have been written: takes out of Q' what recovery brought.
     pub fn forget_recovery(&mut self, scene: &mut Scene, report: &mut StepReport) {
-        let Self { islands, active, solves, threads, .. } = self;
-        let solves = &mut solves[..islands.len()];
-        solves.iter_mut().for_each(|solve| solve.start_over_without_recovery(scene));
+        let count = self.islands.len();
+        self.solves[..count].iter_mut().for_each(|solve| solve.start_over_without_recovery(scene));
         let settings = scene.settings;
         let work_put_in = |solve: &Solve| if settings.audit_energy { solve.problem.work_put_in() } else { 0.0 };
-        let first_work: f64 = solves.iter().filter(|solve| solve.first_energy.is_some()).map(work_put_in).sum();
-        threads.each(solves, |_, solve, workspace| workspace.solve(solve, &settings.solver));
+        let deep = self.solves[..count].iter().filter(|solve| solve.first_energy.is_some());
         // The motion that is kept is paid for by what was done on its way, not on the way that recovery went.
-        report.work_put_in -= first_work;
-        for (island, solve) in solves.iter().enumerate() {
+        report.work_put_in -= deep.map(work_put_in).sum::<f64>();
+        self.solve_again(scene);
+        for (island, solve) in self.solves[..count].iter().enumerate() {
             let Some(first_energy) = solve.first_energy else { continue };
             solve.report.add_to(report);
             report.work_put_in += work_put_in(solve);
             let share = (first_energy / solve.problem.kinetic_energy()).sqrt().min(1.0);
-            for &member in islands.members(island) {
-                let active = active[member as usize];
+            for &member in self.islands.members(island) {
+                let active = self.active[member as usize];
                 let body = &mut scene.bodies[active.id];
                 if body.quarantined {
                     continue;

@@ -10,7 +10,6 @@ use super::problem::{Problem, Unknown};
 use super::second_look::Onward;
 use super::solver::{SolveReport, Solvers, StoppedBecause};
 use super::spots::{Acting, Active};
-use super::threads::Threads;
 use crate::collide::{ContactPoint, SecondPoint};
 use crate::dof::{Body, BodyId, Placed};
 use crate::island::Islands;
@@ -19,10 +18,15 @@ use crate::potential::hold::{Joint, Memory};
 use crate::potential::{PotentialId, Potentials};
 use crate::settings::{Settings, SolverSettings};
 use crate::state::State;
+use crate::threads::{Threads, Workspaces};
+
+/// Islands of fewer bodies than this in all are worked on by the calling thread: waking another one costs more.
+const PARALLEL_BODIES_MIN: usize = 40;
 
 /// Everything that an integration reads and writes.
 pub(crate) struct Scene<'a> {
     pub settings: &'a Settings,
+    pub threads: &'a Threads,
     pub state: &'a mut State,
     pub bodies: &'a mut SlotMap<BodyId, Body>,
     /// All bodies that are awake, in order of serial.
@@ -79,15 +83,10 @@ pub(crate) struct Integrator {
     pub(super) acting: Acting,
     pub(super) solves: Vec<Solve>,
     pub(super) onward: Onward,
-    pub(super) threads: Threads,
+    workspaces: Workspaces<Workspace>,
 }
 
 impl Integrator {
-    /// An integrator that solves islands on `threads` threads.
-    pub fn new(threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
-        Ok(Self { threads: Threads::new(threads)?, ..Self::default() })
-    }
-
     /// Gathers and solves a tick. What comes of it is written by [`Integrator::scatter`].
     pub fn begin(&mut self, scene: &mut Scene) {
         self.onward.spent = SolveReport::default();
@@ -133,14 +132,20 @@ impl Integrator {
     /// Gathers and solves every island that starts anew; `onward` has where those go on from that did before.
     pub(super) fn solve(&mut self, scene: &Scene, onward: Option<&Onward>) {
         self.hand_out(scene);
-        let Self { islands, active, acting, solves, threads, .. } = self;
-        let solves = &mut solves[..islands.len()];
-        let solver = &scene.settings.solver;
-        share_budget(solves, solver.budget);
+        share_budget(&mut self.solves[..self.islands.len()], scene.settings.solver.budget);
+        let Self { islands, active, acting, solves, workspaces, .. } = self;
         let sources = Sources { scene, active, touching: &acting.touching, onward };
-        threads.each(solves, |island, solve, workspace| {
+        each_pending(&mut solves[..islands.len()], scene.threads, workspaces, |island, solve, workspace| {
             solve.gather(islands.members(island), sources);
-            workspace.solve(solve, solver);
+            workspace.solve(solve, &scene.settings.solver);
+        });
+    }
+
+    /// Solves every island that is pending again.
+    pub(super) fn solve_again(&mut self, scene: &Scene) {
+        let Self { islands, solves, workspaces, .. } = self;
+        each_pending(&mut solves[..islands.len()], scene.threads, workspaces, |_, solve, workspace| {
+            workspace.solve(solve, &scene.settings.solver);
         });
     }
 
@@ -164,6 +169,23 @@ impl Integrator {
         }
         report
     }
+}
+
+/// Has `job` done to every island that is pending.
+fn each_pending(
+    solves: &mut [Solve],
+    threads: &Threads,
+    workspaces: &mut Workspaces<Workspace>,
+    job: impl Fn(usize, &mut Solve, &mut Workspace) + Sync,
+) {
+    let pending = || solves.iter().filter(|solve| solve.is_pending);
+    let bodies: usize = pending().map(|solve| solve.blocks).sum();
+    let is_worth_it = bodies >= PARALLEL_BODIES_MIN && pending().nth(1).is_some();
+    threads.each(solves, workspaces, is_worth_it, |island, solve, workspace| {
+        if solve.is_pending {
+            job(island, solve, workspace);
+        }
+    });
 }
 
 /// Writes the state of a body at the end of the tick; `solve` is its island, where something acts on it.

@@ -21,6 +21,7 @@ use crate::potential::Potentials;
 use crate::settings::{Settings, SolverSettings};
 use crate::sleep::Sleepers;
 use crate::state::State;
+use crate::threads::Threads;
 
 pub use conserved::{Energy, Momentum};
 pub use joint_loads::JointId;
@@ -49,6 +50,7 @@ pub struct World {
     stillness: Vec<f64>,
     detector: Detector,
     integrator: Integrator,
+    threads: Threads,
     report: StepReport,
 }
 
@@ -59,7 +61,7 @@ impl World {
     /// [`SimError::OutOfRange`] for a bad setting, [`SimError::Unusable`] where threads cannot be had.
     pub fn new(settings: Settings) -> Result<Self, SimError> {
         settings.validate()?;
-        let integrator = Integrator::new(settings.threads)
+        let threads = Threads::new(settings.threads)
             .map_err(|_| SimError::Unusable { what: "threads cannot be started: use fewer" })?;
         Ok(Self {
             settings,
@@ -74,7 +76,8 @@ impl World {
             sleepers: Sleepers::default(),
             stillness: Vec::new(),
             detector: Detector::default(),
-            integrator,
+            integrator: Integrator::default(),
+            threads,
             report: StepReport::default(),
         })
     }
@@ -89,7 +92,7 @@ impl World {
         self.detector.begin();
         while {
             let bodies = Bodies { bodies: &self.bodies, state: &self.state };
-            self.detector.meet(bodies, &self.settings)
+            self.detector.meet(bodies, &self.settings, &self.threads)
         } {
             // What was touched in its sleep meets others in turn.
             let mut touched = std::mem::take(&mut self.detector.touched);
@@ -115,7 +118,7 @@ impl World {
                 break;
             }
             self.integrator.tell_beliefs(&mut self.detector);
-            if !self.detector.look_again(&candidates, &self.settings) {
+            if !self.detector.look_again(&candidates, &self.settings, &self.threads) {
                 break;
             }
             let (integrator, scene) = self.scene();
@@ -154,6 +157,7 @@ impl World {
         self.sort_potentials();
         let scene = Scene {
             settings: &self.settings,
+            threads: &self.threads,
             state: &mut self.state,
             bodies: &mut self.bodies,
             order: &self.awake,
