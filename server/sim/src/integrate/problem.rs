@@ -230,13 +230,19 @@ impl Problem {
     /// did; only an impact makes a difference that the first iteration does not mend, and what figures of parts do to
     /// themselves, at their joints' limits, is not seen from here.
     pub(super) fn guesses(&self) -> &'static [Guess] {
+        let rests = || self.unknowns.iter().all(Unknown::rests);
         if self.is_parting {
             &[Guess::Solution, Guess::Target, Guess::Before, Guess::Rest]
         } else if !self.solution.is_empty() {
             &[Guess::Solution]
         } else if self.figures.have_parts() || self.terms.contacts.iter().any(ContactTerm::is_impact) {
-            &[Guess::Repeated, Guess::Before, Guess::Target, Guess::Rest]
-        } else if self.unknowns.iter().all(Unknown::rests) {
+            // A crack that is nearly shut counts as an impact in every tick: what rests there is not to move for it.
+            if rests() {
+                &[Guess::Rest, Guess::Repeated, Guess::Before, Guess::Target]
+            } else {
+                &[Guess::Repeated, Guess::Before, Guess::Target, Guess::Rest]
+            }
+        } else if rests() {
             &[Guess::Rest, Guess::Repeated]
         } else {
             &[Guess::Repeated]

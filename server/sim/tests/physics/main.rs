@@ -27,6 +27,7 @@ mod own_kind;
 mod potentials;
 mod queries;
 mod recovery;
+mod rest;
 mod restitution;
 mod second_look;
 mod sheep;

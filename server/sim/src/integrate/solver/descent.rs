@@ -5,7 +5,7 @@ use super::super::line_search::{self, Walk};
 use super::super::matrix::Matrix;
 use super::super::problem::Problem;
 use super::super::vector::{add_scaled, inner};
-use super::guess::guess;
+use super::guess::{good_enough, guess};
 use super::watchdog::{Slopes, Standing, Verdict, Watchdog};
 use super::work::Work;
 use super::{SolveReport, Solver, Standpoint, StoppedBecause};
@@ -23,10 +23,6 @@ const VECTORS_A_TRIAL: u64 = 3;
 /// Most times that open joints of an island are stiffened in a tick: in 6, a link of a gram comes to hold ten tonnes
 /// that it meets for the first time.
 const STIFFENING_ROUNDS: usize = 7;
-
-/// Share of the tolerance that a guess must be within to be taken as it is. The error of an iterate has any sign, that
-/// of a repeated guess repeats: it makes what slides slide too slowly by the tolerance in every tick.
-const GUESS_SHARE: f64 = 0.3;
 
 /// First iteration that friction's tangent comes in: what slides, and which way, has to be seen before.
 const FRICTION_FROM: usize = 3;
@@ -63,6 +59,8 @@ const ALIKE: f64 = 0.01;
 struct Goal {
     /// m/s.
     residual: f64,
+    /// The same of a guess, m/s.
+    guess: f64,
     /// Most iterations.
     iterations: usize,
 }
@@ -122,7 +120,8 @@ impl<const D: usize> Descent<D> {
         self.bends = method.walk() == Walk::NEWTON && problem.bends();
         self.watchdog.begin(self.bends);
         (self.friction_from, self.friction_failures) = (FRICTION_FROM, 0);
-        let mut goal = Goal { residual: settings.tolerance * problem.dt, iterations: settings.iterations() };
+        let (residual, guess) = (settings.tolerance * problem.dt, good_enough(settings, problem.dt));
+        let mut goal = Goal { residual, guess, iterations: settings.iterations() };
         let mut rounds = 0;
         loop {
             self.stand(problem, &mut work, &mut report);
@@ -181,8 +180,8 @@ impl<const D: usize> Descent<D> {
         if !report.residual.is_finite() {
             return Some(StoppedBecause::NonFinite);
         }
-        let share = if report.iterations == 0 { GUESS_SHARE } else { 1.0 };
-        if report.residual <= share * goal.residual {
+        let wanted = if report.iterations == 0 { goal.guess } else { goal.residual };
+        if report.residual <= wanted {
             return Some(StoppedBecause::Tolerance);
         }
         if report.iterations >= goal.iterations {

@@ -5,7 +5,16 @@ use super::super::problem::Problem;
 use super::work::Work;
 use crate::settings::SolverSettings;
 
-/// Moves `u` and the trial to the first of the guesses that is within the tolerance as it is, else to the cheapest in
+/// Share of the tolerance that a guess must be within to be taken as it is. The error of an iterate has any sign, that
+/// of a repeated guess repeats: it makes what slides slide too slowly by the tolerance in every tick.
+const SHARE: f64 = 0.3;
+
+/// Largest residual with which a guess is taken as it is, m/s.
+pub(super) fn good_enough(settings: &SolverSettings, dt: f64) -> f64 {
+    SHARE * settings.tolerance * dt
+}
+
+/// Moves `u` and the trial to the first of the guesses that is good enough as it is, else to the cheapest in
 /// incremental potential, and takes there what is frozen during an iteration. Answers the potential, J, and leaves its
 /// gradient in `residual`. `scratch` is memory.
 pub(super) fn guess<const D: usize>(
@@ -28,7 +37,7 @@ pub(super) fn guess<const D: usize>(
         if is_last {
             least = energy;
             std::mem::swap(u, scratch);
-            if problem.residual_speed(residual) <= settings.tolerance * problem.dt {
+            if problem.residual_speed(residual) <= good_enough(settings, problem.dt) {
                 return least;
             }
         }
