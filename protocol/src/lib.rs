@@ -27,7 +27,7 @@ pub use keys::Keys;
 /// Version of everything this crate encodes; the first field of every message.
 ///
 /// A peer of another version is refused at join with both numbers in the text.
-pub const PROTOCOL_VERSION: u16 = 6;
+pub const PROTOCOL_VERSION: u16 = 7;
 
 /// Where a daemon listens, and where clients look for it, unless told otherwise.
 pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";

@@ -5,7 +5,7 @@
 //! where no frame is free, the tick leaves none.
 
 use crossbeam_queue::ArrayQueue;
-use pita_game::{ActorInfo, ArenaEvent};
+use pita_game::{ActorInfo, ArenaEvent, PartInfo};
 use pita_protocol::dof::{BODY_GROUPS_MAX, Group, State, kind, relative};
 use pita_protocol::message::{InputAck, InputCounts, TickRecord};
 use pita_sim::{BlockSize, DofKind, SliceView, World};
@@ -78,10 +78,23 @@ struct Dof {
     /// What the numbers are, slice by slice.
     layouts: Vec<Group>,
     numbers: Vec<f64>,
-    /// Parts of actors with the first part of each.
-    attached: Vec<(u32, u32)>,
+    /// Further parts of actors.
+    attached: Vec<Attached>,
     actors: Vec<ActorHead>,
 }
+
+/// A further part of an actor, by its slice.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Attached {
+    id: u32,
+    /// Slice of the actor's first part.
+    root: u32,
+    /// Whether it turns about its own z, as the root sees it.
+    is_hinged: bool,
+}
+
+/// Groups of what turns about its own z.
+const HINGED: [Group; 2] = [Group::Point, Group::Hinge];
 
 /// An actor by the slice of its first part.
 #[derive(Clone, Copy)]
@@ -127,7 +140,9 @@ impl Frame {
             if let Some((first, others)) = actor.parts.split_first() {
                 self.dof.actors.push(ActorHead { root: first.slice, slot: actor.slot, importance });
                 let others = others.iter().filter(|part| part.slice != first.slice);
-                self.dof.attached.extend(others.map(|part| (part.slice, first.slice)));
+                let attached =
+                    |part: &PartInfo| Attached { id: part.slice, root: first.slice, is_hinged: part.is_hinged };
+                self.dof.attached.extend(others.map(attached));
             }
         }
     }
@@ -183,22 +198,24 @@ impl Dof {
             let parent = self.parent(head);
             let q = self.q(head);
             let seen = parent.map(|parent| relative(self.q(parent), q));
-            let (layout, q) = (head.groups.of(&self.layouts), seen.as_ref().map_or(q, |seen| &seen[..]));
+            let is_hinged = seen.is_some() && self.attached(head.id).is_some_and(|attached| attached.is_hinged);
+            let layout = if is_hinged { &HINGED } else { head.groups.of(&self.layouts) };
+            let q = seen.as_ref().map_or(q, |seen| &seen[..]);
             let pushed = into.push(head.id, head.kind, parent.map(|parent| parent.id), layout, q);
             // A world of more bodies than a stream may have shows its oldest.
             if pushed.is_err() {
                 break;
             }
-            if !self.root_of(head.id).is_some_and(|root| crowd.add_member(root)) {
+            if !self.attached(head.id).is_some_and(|attached| crowd.add_member(attached.root)) {
                 crowd.add_root(self.family(head));
             }
         }
     }
 
-    /// The first slice of the actor that `id` is a further slice of.
-    fn root_of(&self, id: u32) -> Option<u32> {
-        let at = self.attached.binary_search_by_key(&id, |(part, _)| *part).ok()?;
-        Some(self.attached[at].1)
+    /// What is known of the slice `id` where it is a further one of an actor.
+    fn attached(&self, id: u32) -> Option<&Attached> {
+        let at = self.attached.binary_search_by_key(&id, |attached| attached.id).ok()?;
+        Some(&self.attached[at])
     }
 
     fn family(&self, head: &SliceHead) -> Family {
@@ -218,7 +235,7 @@ impl Dof {
 
     /// The body in whose frame `head` is coded: an earlier one, both of them rigid.
     fn parent(&self, head: &SliceHead) -> Option<&SliceHead> {
-        let root = self.root_of(head.id)?;
+        let root = self.attached(head.id)?.root;
         let parent = self.heads.binary_search_by_key(&root, |head| head.id).ok()?;
         let parent = &self.heads[parent];
         let are_rigid = head.kind == kind::RIGID_BODY && parent.kind == kind::RIGID_BODY;
@@ -338,20 +355,26 @@ mod tests {
         push(9, DofKind::RigidBody, (7, 6), &[12.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]);
         push(5, DofKind::Particle, (3, 3), &[1.0, 2.0, f64::NAN]);
         push(4, DofKind::RigidBody, (7, 6), &[10.0, 2.0, 3.0, 0.0, 1.0, 0.0, 0.0]);
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        push(10, DofKind::RigidBody, (7, 6), &[10.0, 2.0, 3.0, half, half, 0.0, 0.0]);
         push(11, DofKind::Own("clock"), (1, 1), &[0.5]);
-        dof.attached.extend([(5, 4), (9, 4)]);
+        let attached = |id, is_hinged| Attached { id, root: 4, is_hinged };
+        dof.attached.extend([attached(5, true), attached(9, true), attached(10, true)]);
         dof.actors.push(ActorHead { root: 4, slot: Some(7), importance: 2.0 });
         let mut state = State::new(Precision::default()).unwrap();
         dof.quantise(&mut state, &mut crowd);
-        assert_eq!(crowd.of_bodies(), [0, 0, 0, 1]);
+        assert_eq!(crowd.of_bodies(), [0, 0, 0, 0, 1]);
         let car = Family { root: 4, position: Some([10.0, 2.0, 3.0]), speed: 5.0, importance: 2.0, slot: Some(7) };
         let clock = Family { root: 11, position: None, speed: 0.0, importance: 1.0, slot: None };
         assert_eq!(crowd.families(), [car, clock]);
         let bodies: Vec<_> = state.bodies().iter().map(|body| (body.id, body.parent)).collect();
-        assert_eq!(bodies, [(4, None), (5, None), (9, Some(4)), (11, None)]);
+        assert_eq!(bodies, [(4, None), (5, None), (9, Some(4)), (10, Some(4)), (11, None)]);
         // Half a turn about y.
         assert_eq!(state.groups(&state.bodies()[2])[0].steps, [-2000, 0, 0]);
         assert_eq!(state.groups(&state.bodies()[1])[0].steps, [1000, 2000, 0]);
+        // One has its axis upside down, so there is no angle about it; the other is a quarter of a turn on.
+        let turned = [2, 3].map(|body| state.groups(&state.bodies()[body])[1]);
+        assert_eq!((turned[0].group, turned[1].group, turned[1].steps), (Group::Rotation, Group::Hinge, [0, 0, 1024]));
     }
 
     #[test]

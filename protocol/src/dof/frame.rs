@@ -176,15 +176,29 @@ impl Frame {
         &self.groups[body.start as usize..][..body.groups.into()]
     }
 
+    /// Whether `body` of this frame is in `state`.
+    pub(super) fn is_in(&self, body: &Body, state: &State) -> bool {
+        state.find(body.id).is_some_and(|now| self.is_same(body, state, now))
+    }
+
+    /// Whether `body` of this frame and `now` of `state` are one; of another shape under the same id they are not.
+    pub(super) fn is_same(&self, body: &Body, state: &State, now: &Body) -> bool {
+        let shape = |body: &Body| (body.id, body.kind, body.parent, body.groups);
+        let groups = || self.groups(body).iter().zip(state.groups(now));
+        shape(body) == shape(now) && groups().all(|(had, now)| had.value.group == now.group)
+    }
+
     /// Sum of hashes of all that the receiver has, folded to 16 bits: a desync is noticed at once.
     pub fn check(&self) -> u16 {
         let mut sum = 0u64;
         for (index, group) in self.groups.iter().enumerate() {
-            let Quantised { largest, steps: [a, b, c], .. } = group.value;
-            sum = sum.wrapping_add(mixed([a as u32, b as u32, c as u32, (index as u32) << 2 | u32::from(largest)]));
+            let Quantised { largest, steps: [a, b, c], group } = group.value;
+            let what = (index as u32) << 5 | (group as u32) << 2 | u32::from(largest);
+            sum = sum.wrapping_add(mixed([a as u32, b as u32, c as u32, what]));
         }
         for (body, tick) in self.bodies() {
-            sum = sum.wrapping_add(mixed([body.id, tick as u32, body.start, 0]));
+            let parent = body.parent.map_or(0, |parent| parent + 1);
+            sum = sum.wrapping_add(mixed([body.id, tick as u32, u32::from(body.kind) << 24 | body.start, parent]));
         }
         (sum >> 48) as u16
     }

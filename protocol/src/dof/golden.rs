@@ -57,7 +57,7 @@ fn write_golden_vectors() {
         let chassis = [0.3 * t, (0.05 * t * (30.0 - t)).max(0.5), -2.0, 0.0, spin, 0.0, (1.0 - spin * spin).sqrt()];
         let wheel = [1.2, -0.4, 0.7, 0.0, 0.0, (0.7 * t).sin(), (0.7 * t).cos()];
         state.push(3, kind::RIGID_BODY, None, &[Group::Point, Group::Rotation], &chassis).unwrap();
-        state.push(5, kind::RIGID_BODY, Some(3), &[Group::Point, Group::Rotation], &wheel).unwrap();
+        state.push(5, kind::RIGID_BODY, Some(3), &[Group::Point, Group::Hinge], &wheel).unwrap();
         if !(10..20).contains(&tick) {
             let joints = [Group::Point, Group::Rotation, Group::Scalar, Group::Scalar];
             let figure = [0.0, 1.0, 0.01 * t * t, 0.6, 0.0, 0.0, 0.8, 0.1 * t, -0.2];

@@ -19,6 +19,7 @@ mod cells;
 mod frame;
 #[cfg(test)]
 mod golden;
+mod hinge;
 mod model;
 mod predict;
 mod priority;

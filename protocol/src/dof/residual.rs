@@ -6,11 +6,11 @@
 
 use super::ans::Coder;
 use super::model::{Bit, Symbols};
-use super::predict::GroupState;
-use super::quantise::{Fineness, Group, Quantised, others};
+use super::predict::{GroupState, Line, Track, Turn};
+use super::quantise::{Fineness, Group, Quantised, others, within};
 use crate::{WireError, codec::require};
 
-const GROUPS: usize = 4;
+const GROUPS: usize = Group::ALL.len();
 const ERRORS: usize = 16;
 const FAR_ERRORS: usize = 24;
 const NEAR: usize = 3;
@@ -18,7 +18,7 @@ const NEAR: usize = 3;
 /// Patterns of up to three components of 0, 1, or 2 and more steps each; the first of them counts 1, the second 3.
 const PATTERNS: usize = 27;
 /// Patterns of groups, by their kind.
-const PATTERNS_OF: [usize; GROUPS] = [27, 27, 3, 27];
+const PATTERNS_OF: [usize; GROUPS] = [27, 27, 3, 27, 27];
 /// The classes of a pattern's components: 0, 1, or 2 and more steps.
 const CLASSES: [[u32; 3]; PATTERNS] = {
     let mut classes = [[0; 3]; PATTERNS];
@@ -41,7 +41,7 @@ const FAR: usize = 15;
 /// Contexts of [`Bit`]s.
 mod at {
     pub const NUMBER: usize = 0;
-    pub const FLAG: usize = NUMBER + 8 * 32;
+    pub const FLAG: usize = NUMBER + 9 * 32;
     pub const CALM: usize = FLAG + 8;
     pub const END: usize = CALM + 3;
 }
@@ -52,6 +52,18 @@ pub struct Models {
     first: First,
     rest: Rest,
     bits: [Bit; at::END],
+}
+
+/// What is known of a group that goes on, beside its state.
+pub struct Next<'a> {
+    /// Ticks since that.
+    pub ahead: i64,
+    /// Size of the residual of its body's last group, steps; `None` for the first.
+    pub sibling: Option<u32>,
+    /// What an encoder has; `None` when decoding.
+    pub value: Option<&'a Quantised>,
+    /// How fine rotations are.
+    pub fineness: &'a Fineness,
 }
 
 impl Models {
@@ -88,8 +100,7 @@ impl Models {
         (zigzag >> 1) as i32 ^ -((zigzag & 1) as i32)
     }
 
-    /// Codes a group that goes on from `state`, whose track leads to `track`; `value` is what an encoder has, `sibling` the
-    /// size of the residual of this body's last group, steps. Answers the size of its residual.
+    /// Codes a group that goes on from `state`. Answers the size of its residual, steps.
     ///
     /// # Errors
     /// [`WireError::Content`] for a number that no state has.
@@ -98,48 +109,61 @@ impl Models {
         &mut self,
         coder: &mut C,
         state: &mut GroupState,
-        ahead: i64,
-        sibling: Option<u32>,
-        value: Option<&Quantised>,
-        fineness: &Fineness,
+        next: &Next<'_>,
     ) -> Result<u32, WireError> {
-        let kind = state.value.group;
-        let error = error_bucket(state.expected_error());
-        let near = sibling.map_or(0, |size| 1 + usize::from(size > 0));
-        let context = (kind as usize * ERRORS + error.min(ERRORS - 1)) * NEAR + near;
+        if state.value.group == Group::Rotation {
+            return self.rotation(coder, state, next);
+        }
+        let track = Line::of(state, next.ahead);
+        let mut expected = state.expected(&track, next.fineness);
+        let pattern = self.first(coder, state, next, &expected);
+        let size = self.residual(coder, state, next, pattern, &mut expected)?;
+        state.follow(&track, expected, next.fineness);
+        Ok(size)
+    }
 
-        let track = state.track(ahead);
-        let mut expected = state.expected(&track, fineness);
-        let mut first = self.first.code(coder, context, first_symbol(&expected, value));
-        if kind == Group::Rotation && first >= PATTERNS {
+    /// The same of a rotation, whose first symbol may say that another component is left out.
+    #[inline]
+    fn rotation<C: Coder>(&mut self, coder: &mut C, state: &mut GroupState, next: &Next<'_>) -> Result<u32, WireError> {
+        let track = Turn::of(state, next.ahead);
+        let mut expected = state.expected(&track, next.fineness);
+        let mut first = self.first(coder, state, next, &expected);
+        if first >= PATTERNS {
             let others = others(expected.largest.into());
             require(first < PATTERNS + others.len(), "first symbol", "at most 29")?;
-            expected = state.expected_without(others[first - PATTERNS], &track, fineness);
-            first = self.first.code(coder, context, first_symbol(&expected, value));
+            expected = track.expected_without(others[first - PATTERNS], state, next.fineness);
+            first = self.first(coder, state, next, &expected);
         }
-        let mut size = 0;
-        if first != 0 {
-            size = self.steps(coder, first, &mut expected, error, value)?;
-            expected.check(fineness)?;
-        }
-        state.follow(&track, expected, fineness);
+        let size = self.residual(coder, state, next, first, &mut expected)?;
+        state.follow(&track, expected, next.fineness);
         Ok(size)
+    }
+
+    #[inline]
+    fn first<C: Coder>(&mut self, coder: &mut C, state: &GroupState, next: &Next<'_>, expected: &Quantised) -> usize {
+        let error = error_bucket(state.expected_error()).min(ERRORS - 1);
+        let near = next.sibling.map_or(0, |size| 1 + usize::from(size > 0));
+        let context = (state.value.group as usize * ERRORS + error) * NEAR + near;
+        self.first.code(coder, context, first_symbol(expected, next.value, next.fineness))
     }
 
     /// Adds to what was expected by how much it is off, by `pattern`: sizes, then signs. Answers the sum of sizes.
     #[inline]
-    fn steps<C: Coder>(
+    fn residual<C: Coder>(
         &mut self,
         coder: &mut C,
+        state: &GroupState,
+        next: &Next<'_>,
         pattern: usize,
         expected: &mut Quantised,
-        error: usize,
-        value: Option<&Quantised>,
     ) -> Result<u32, WireError> {
+        if pattern == 0 {
+            return Ok(0);
+        }
         let kind = expected.group as usize;
         require(pattern < PATTERNS_OF[kind], "first symbol", "a pattern of the group's components")?;
-        let context = kind * FAR_ERRORS + error.min(FAR_ERRORS - 1);
-        let residual = value.map_or([0; 3], |value| [0, 1, 2].map(|i| value.steps[i] - expected.steps[i]));
+        let context = kind * FAR_ERRORS + error_bucket(state.expected_error()).min(FAR_ERRORS - 1);
+        let residual = next.value.map_or([0; 3], |value| value.minus(expected, next.fineness));
         let mut sizes = CLASSES[pattern];
         for (size, residual) in sizes.iter_mut().zip(residual) {
             if *size > 1 {
@@ -154,6 +178,8 @@ impl Models {
             *step += if signs & off[i] == 1 { -size } else { size };
             signs >>= off[i];
         }
+        expected.steps[2] = within(expected.steps[2], next.fineness.beyond(expected.group));
+        expected.check(next.fineness)?;
         Ok(sizes.iter().sum())
     }
 
@@ -184,14 +210,14 @@ impl Default for Models {
 }
 
 /// What an encoder's `value` is in the first symbol.
-fn first_symbol(expected: &Quantised, value: Option<&Quantised>) -> usize {
+fn first_symbol(expected: &Quantised, value: Option<&Quantised>, fineness: &Fineness) -> usize {
     let Some(value) = value else { return 0 };
     if value.largest != expected.largest {
         let other = others(expected.largest.into()).into_iter().position(|other| other == usize::from(value.largest));
         return PATTERNS + other.unwrap_or(0);
     }
-    let class = |i: usize| value.steps[i].abs_diff(expected.steps[i]).min(2) as usize;
-    class(0) + 3 * class(1) + 9 * class(2)
+    let [a, b, c] = value.minus(expected, fineness).map(|steps| steps.unsigned_abs().min(2) as usize);
+    a + 3 * b + 9 * c
 }
 
 /// Buckets, two to an octave from a quarter of a step on.

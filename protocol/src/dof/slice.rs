@@ -12,7 +12,7 @@ pub struct Slice {
     pub kind: u8,
     /// Tick of these numbers: an earlier one than the snapshot's where the snapshot did not carry the body.
     pub tick: u64,
-    /// What the numbers of Q are, in order; rates are not among them.
+    /// What the numbers of Q are, in order; rates are not among them, and a hinge is a rotation.
     pub groups: Vec<Group>,
     /// Generalised positions: m, unit quaternions x y z w, rad; in the world.
     pub q: Vec<f32>,
@@ -46,7 +46,13 @@ impl Frame {
         }
         // Steps are bounded, so these are far within single precision.
         let single = |numbers: Vec<f64>| numbers.into_iter().map(|x| x as f32).collect();
-        let groups = self.groups(body).iter().map(|state| state.value.group).filter(|&group| group != Group::Rate);
+        let shown = |group| match group {
+            Group::Rate => None,
+            // Its numbers are those of a rotation.
+            Group::Hinge => Some(Group::Rotation),
+            group => Some(group),
+        };
+        let groups = self.groups(body).iter().filter_map(|state| shown(state.value.group));
         let (id, kind, tick) = (body.id, body.kind, self.tick_of(body, CHAIN_MAX)?);
         Some(Slice { id, kind, tick, groups: groups.collect(), q: single(q), v: single(v) })
     }

@@ -99,9 +99,7 @@ impl Encoder {
             while known.next_if(|known| known.id < body.id).is_some() {}
             let had = known.peek().filter(|known| known.id == body.id).zip(base);
             into.push(match had {
-                Some((known, base)) if known.groups == body.groups && known.kind == body.kind => {
-                    need(base.groups(known), state.groups(body))
-                }
+                Some((known, base)) if base.is_same(known, state, body) => need(base.groups(known), state.groups(body)),
                 _ => Need::First { groups: body.groups },
             });
         }

@@ -5,7 +5,7 @@ use super::budget::Spent;
 use super::frame::{BODIES_MAX, BODY_GROUPS_MAX, Body, Frame, GROUPS_MAX, State};
 use super::predict::GroupState;
 use super::quantise::{Fineness, Group, Quantised};
-use super::residual::Models;
+use super::residual::{Models, Next};
 use crate::{WireError, codec::require};
 
 /// Uses of whole numbers.
@@ -99,7 +99,8 @@ impl<'a, C: Coder> Walk<'a, C> {
     fn removals(&mut self, models: &mut Models) -> Result<Vec<usize>, WireError> {
         let gone: Vec<_> = match self.source() {
             Some(Source { state, .. }) => {
-                (0..self.base.bodies.len()).filter(|&i| !is_in(&self.base.bodies[i], state)).collect()
+                let is_gone = |&i: &usize| !self.base.is_in(&self.base.bodies[i], state);
+                (0..self.base.bodies.len()).filter(is_gone).collect()
             }
             None => Vec::new(),
         };
@@ -165,7 +166,12 @@ impl<'a, C: Coder> Walk<'a, C> {
         let count = self.coder.raw(groups.len() as u32, 16) as usize;
         require((1..=BODY_GROUPS_MAX).contains(&count), "groups of a body", "1 to 4096")?;
         let code = |i: usize| groups.get(i).map_or(0, |&group| group as u32);
-        Ok((kind, (0..count).map(|i| Group::ALL[self.coder.raw(code(i), 2) as usize]).collect()))
+        Ok((kind, (0..count).map(|i| self.group(code(i))).collect::<Result<_, _>>()?))
+    }
+
+    fn group(&mut self, code: u32) -> Result<Group, WireError> {
+        let group = Group::ALL.get(self.coder.raw(code, 3) as usize).copied();
+        group.ok_or(WireError::Content { field: "group", allowed: "0 to 4" })
     }
 
     /// A body that the receiver does not have yet.
@@ -240,8 +246,8 @@ impl<'a, C: Coder> Walk<'a, C> {
         let (mut moved, mut changed, written) = (0, 0, self.coder.written());
         let mut sibling = None;
         for (i, state) in states.iter_mut().enumerate() {
-            let (old, now) = (state.value, now.map(|now| &now[i]));
-            let size = models.group(self.coder, state, ahead, sibling, now, fineness)?;
+            let (old, value) = (state.value, now.map(|now| &now[i]));
+            let size = models.group(self.coder, state, &Next { ahead, sibling, value, fineness })?;
             sibling = Some(size);
             moved += size;
             changed += usize::from(C::WRITES && state.value != old);
@@ -265,22 +271,16 @@ struct Added {
 fn fresh<'a>(base: &'a Frame, source: &Source<'a>) -> impl Iterator<Item = &'a Body> {
     let source = *source;
     let bodies = source.state.bodies().iter().enumerate();
-    let is_new = |body: &Body| base.find(body.id).is_none_or(|old| !is_in(old, source.state));
+    let is_new = |body: &Body| base.find(body.id).is_none_or(|old| !base.is_in(old, source.state));
     bodies.filter(move |(index, body)| source.carries(*index) && is_new(body)).map(|(_, body)| body)
 }
 
-/// Whether a body that the receiver has is in `state`; one of another shape under the same id is not the same.
-fn is_in(body: &Body, state: &State) -> bool {
-    let shape = |body: &Body| (body.kind, body.parent, body.groups);
-    state.find(body.id).is_some_and(|now| shape(now) == shape(body))
-}
-
 fn is_changed(base: &Frame, source: &Source) -> bool {
-    let shape = |body: &Body| (body.id, body.kind, body.parent, body.groups);
-    if base.bodies.iter().map(shape).eq(source.state.bodies().iter().map(shape)) {
+    let (had, now) = (&base.bodies, source.state.bodies());
+    if had.len() == now.len() && had.iter().zip(now).all(|(had, now)| base.is_same(had, source.state, now)) {
         return false;
     }
-    base.bodies.iter().any(|body| !is_in(body, source.state)) || fresh(base, source).next().is_some()
+    had.iter().any(|body| !base.is_in(body, source.state)) || fresh(base, source).next().is_some()
 }
 
 fn first_value(

@@ -16,6 +16,9 @@ pub struct PartInfo {
     pub rotation: DQuat,
     /// Shape in that frame.
     pub shape: Shape,
+    /// Whether the slice is a rigid body that, seen from the actor's first part, turns about its own z and hardly otherwise,
+    /// as a wheel does. So it takes less of the wire.
+    pub is_hinged: bool,
 }
 
 /// How a shape follows a slice.
@@ -38,19 +41,29 @@ impl PartInfo {
     /// A shape with its origin at a material point of a body of any kind, its axes those of the part there.
     pub fn at(world: &World, body: BodyId, at: PartPoint, shape: Shape) -> Self {
         let mount = world.mount(body, at).map_or(PartMount::Own, PartMount::Rigid);
-        Self { slice: world.serial(body).unwrap_or_default(), mount, rotation: DQuat::IDENTITY, shape }
+        Self::mounted(world, body, mount, shape)
     }
 
     /// A hull or mesh that deforms with a body: a material point for each of its vertices.
     pub fn skin(world: &World, body: BodyId, vertices: &[PartPoint], shape: Shape) -> Self {
         let mounts: Option<Vec<_>> = vertices.iter().map(|&at| world.mount(body, at)).collect();
-        let mount = mounts.map_or(PartMount::Own, PartMount::Skin);
-        Self { slice: world.serial(body).unwrap_or_default(), mount, rotation: DQuat::IDENTITY, shape }
+        Self::mounted(world, body, mounts.map_or(PartMount::Own, PartMount::Skin), shape)
+    }
+
+    fn mounted(world: &World, body: BodyId, mount: PartMount, shape: Shape) -> Self {
+        let slice = world.serial(body).unwrap_or_default();
+        Self { slice, mount, rotation: DQuat::IDENTITY, shape, is_hinged: false }
     }
 
     /// The same, the shape's axes turned against the part's.
     #[must_use]
     pub fn turned(self, rotation: DQuat) -> Self {
         Self { rotation, ..self }
+    }
+
+    /// The same of a body that [turns about its own z](Self::is_hinged).
+    #[must_use]
+    pub fn hinged(self) -> Self {
+        Self { is_hinged: true, ..self }
     }
 }

@@ -148,7 +148,7 @@ fn few_bytes_cannot_claim_much_memory() {
         if body == 0 {
             coder.raw(kind::LATTICE.into(), 8);
             coder.raw(BODY_GROUPS_MAX as u32, 16);
-            (0..BODY_GROUPS_MAX).for_each(|_| _ = coder.raw(Group::Point as u32, 2));
+            (0..BODY_GROUPS_MAX).for_each(|_| _ = coder.raw(Group::Point as u32, 3));
         }
     }
     coder.finish(&mut bytes);

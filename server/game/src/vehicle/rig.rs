@@ -175,7 +175,9 @@ impl Rig {
     /// Slices and shapes of the bodies.
     pub fn parts(&self, world: &World) -> Vec<PartInfo> {
         let part = |(&body, shape): (&BodyId, &Shape)| PartInfo::new(world, body, shape.clone());
-        self.bodies.iter().zip(&self.shapes).map(part).collect()
+        let mut parts = self.bodies.iter().zip(&self.shapes).map(part);
+        let chassis = parts.next();
+        chassis.into_iter().chain(parts.map(PartInfo::hinged)).collect()
     }
 
     /// Puts the whole car at `pose`, upright and at rest.

@@ -134,8 +134,10 @@ pub fn arena(ticks: usize) -> Result<Trace, EntryError> {
             for actor in arena.actors() {
                 let place = |slice| bodies.binary_search_by_key(&slice, |body| body.id).ok();
                 let root = actor.parts.first().and_then(|part| place(part.slice));
-                for part in actor.parts.iter().skip(1).filter_map(|part| place(part.slice)).collect::<Vec<_>>() {
-                    bodies[part].parent = root;
+                let others = actor.parts.iter().skip(1);
+                let others: Vec<_> = others.filter_map(|part| Some((place(part.slice)?, part.is_hinged))).collect();
+                for (at, is_hinged) in others {
+                    (bodies[at].parent, bodies[at].is_hinged) = (root, is_hinged);
                 }
             }
             trace.ticks.push(bodies);

@@ -12,6 +12,8 @@ pub struct Placed {
     pub id: u32,
     /// The body in whose frame it is coded, by its place in the tick.
     pub parent: Option<usize>,
+    /// Whether it turns about its own z there.
+    pub is_hinged: bool,
     /// Position, m, and quaternion x y z w.
     pub q: [f64; 7],
     /// m/s and rad/s.
@@ -22,7 +24,7 @@ impl Placed {
     /// A particle or rigid body of the engine; nothing else is in these scenes.
     pub fn of(slice: &SliceView<'_>) -> Option<Self> {
         let (q, v) = (*slice.q.first_chunk::<7>()?, *slice.v.first_chunk::<6>()?);
-        Some(Self { id: slice.serial, parent: None, q, v })
+        Some(Self { id: slice.serial, parent: None, is_hinged: false, q, v })
     }
 
     /// Whether it moves faster than 2 cm/s or turns faster than 0.05 rad/s.
@@ -56,7 +58,7 @@ impl Trace {
             let parent = body.parent.map(|parent| &bodies[parent]);
             let q = parent.map_or(body.q, |parent| relative(&parent.q, &body.q));
             let parent = parent.map(|parent| parent.id);
-            let layout = [Group::Point, Group::Rotation];
+            let layout = [Group::Point, if body.is_hinged { Group::Hinge } else { Group::Rotation }];
             into.push(body.id, kind::RIGID_BODY, parent, &layout, &q).expect("bodies of an engine, in order of id");
         }
     }
