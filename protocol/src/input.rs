@@ -34,19 +34,24 @@ pub mod buttons {
     pub const REVERSE: u16 = 1;
     /// Block the rear wheels.
     pub const HANDBRAKE: u16 = 2;
-    /// Put the vehicle back on its wheels where it is.
+    /// Put the vehicle back on its wheels where it is; acts when it is pressed.
     pub const RESET: u16 = 4;
-    /// Push from behind.
+    /// Push from behind as long as the tank lasts.
     pub const BOOST: u16 = 8;
-    /// Jump.
+    /// Jump; acts when it is pressed.
     pub const JUMP: u16 = 16;
     /// Fire the weapon that is at hand.
     pub const FIRE: u16 = 32;
-    /// Take the next weapon.
+    /// Take the next weapon; acts when it is pressed.
     pub const NEXT_WEAPON: u16 = 64;
 }
 
 impl Controls {
+    /// Whether a button of [`buttons`] is held.
+    pub fn holds(&self, button: u16) -> bool {
+        self.buttons & button != 0
+    }
+
     /// # Errors
     /// [`WireError::Content`] for a value that is not finite or out of range.
     pub fn validate(&self) -> Result<(), WireError> {

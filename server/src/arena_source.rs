@@ -11,6 +11,7 @@ use pita_game::{ActorKinds, Arena, ArenaError, ArenaSettings, Reload, ReloadErro
 use pita_protocol::message::{ArenaSource, SOURCE_FILES_BYTES_MAX, SOURCE_FILES_MAX, SourceFile};
 use pita_sim::geometry::FILE_MAX as GEOMETRY_MAX;
 
+use crate::config::steps_per_m_max;
 use crate::files;
 
 /// Names and texts of the compiled-in arenas; the first is the default.
@@ -93,9 +94,10 @@ impl ArenaText {
     /// Builds the arena.
     ///
     /// # Errors
-    /// [`SourceError::Invalid`].
+    /// [`SourceError::Invalid`], also where its own steps are too fine to be sent as far as its bounds are.
     pub fn build(&self, settings: &ArenaSettings) -> Result<Arena, SourceError> {
         let supplies = Supplies { kinds: &ActorKinds::built_in(), read: &|name| self.read(name) };
+        self.check_steps().map_err(|reason| self.invalid(reason))?;
         Arena::from_toml_with(&self.text, settings, &supplies).map_err(|reason| self.invalid(reason))
     }
 
@@ -105,8 +107,25 @@ impl ArenaText {
     /// [`SourceError::Unchangeable`].
     pub fn change_from(&self, old: &str, settings: &ArenaSettings) -> Result<Reload, SourceError> {
         let supplies = Supplies { kinds: &ActorKinds::built_in(), read: &|name| self.read(name) };
-        Reload::between(old, &self.text, settings, &supplies)
+        let steps = self.check_steps().map_err(ReloadError::from);
+        steps
+            .and_then(|()| Reload::between(old, &self.text, settings, &supplies))
             .map_err(|reason| SourceError::Unchangeable { file: self.label.clone(), reason })
+    }
+
+    /// Checks that its own steps, where it has any, reach as far as its bounds.
+    fn check_steps(&self) -> Result<(), ArenaError> {
+        let file = ArenaFile::parse(&self.text)?;
+        let reach_m = file.bounds.reach_m();
+        let most = steps_per_m_max(reach_m);
+        match file.precision.steps_per_m.filter(|&steps| steps > most) {
+            None => Ok(()),
+            Some(steps) => Err(ArenaError::OutOfRange {
+                key: "precision.steps_per_m".to_owned(),
+                value: steps.to_string(),
+                allowed: format!("10 to {most} steps a metre, for bounds {reach_m} m from the origin"),
+            }),
+        }
     }
 
     /// What clients need to predict their own cars: the text, and its meshes unless they are too much to send.
@@ -157,4 +176,28 @@ fn read_beside(folder: &Path, name: &str) -> io::Result<Vec<u8>> {
 
 fn names() -> String {
     BUILT_IN.map(|(name, _)| name).join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_arena_s_own_steps_have_to_reach_its_bounds() {
+        let settings = ArenaSettings { tick_hz: 30, threads: 1 };
+        let text = |steps: u32, reach_m: u32| {
+            let bounds = Arena::DEFAULT.replacen("max = [125.0", &format!("max = [{reach_m}.0"), 1);
+            let text = bounds.replacen("[bounds]", &format!("[precision]\nsteps_per_m = {steps}\n[bounds]"), 1);
+            ArenaText::built_in("a", &text)
+        };
+        let near = text(20_000, 125);
+        assert!(near.build(&settings).is_ok() && text(13_421, 5000).build(&settings).is_ok());
+        let allowed = "allowed: 10 to 13421 steps a metre, for bounds 5000 m from the origin";
+        let expected = format!("built-in arena a: precision.steps_per_m is 20000, {allowed}");
+        let far = text(20_000, 5000);
+        let said = |result: Result<(), SourceError>| result.map_err(|error| error.to_string());
+        assert_eq!(said(far.build(&settings).map(drop)), Err(expected.clone()));
+        // Nor may bounds move away from under the steps.
+        assert_eq!(said(far.change_from(&near.text, &settings).map(drop)), Err(expected));
+    }
 }

@@ -114,8 +114,10 @@ pub struct PrecisionSteps {
     pub joint_steps: Within<10, 65_536>,
 }
 
-/// Arena files are checked without the wire.
-const _: () = assert!(pita_game::arena_file::STEPS_MAX as i32 == STEPS_MAX);
+/// Steps of a metre that the wire can carry as far as `reach_m` from the origin, at most.
+pub fn steps_per_m_max(reach_m: f64) -> u32 {
+    (f64::from(STEPS_MAX) / reach_m.max(1.0)) as u32
+}
 
 impl PrecisionSteps {
     /// The precision of an arena whose file wants `own`, which goes first.
@@ -132,7 +134,7 @@ impl PrecisionSteps {
     /// [`ConfigError::Key`], which calls the configuration `file`.
     pub fn check_reach(&self, reach_m: f64, file: &str) -> Result<(), ConfigError> {
         let steps = self.steps_per_m.get();
-        let most = (f64::from(STEPS_MAX) / reach_m.max(1.0)) as u32;
+        let most = steps_per_m_max(reach_m);
         if steps <= most {
             return Ok(());
         }

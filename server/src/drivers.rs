@@ -119,8 +119,7 @@ impl Drivers {
             if now.tick.saturating_sub(seat.heard_tick) >= self.coast_after_ticks {
                 seat.controls = Controls::default();
             }
-            let Controls { throttle, brake, steer, buttons } = seat.controls;
-            let mut controls = GameControls::from_input([throttle, brake, steer], buttons);
+            let mut controls = to_game(&seat.controls);
             controls.reset |= std::mem::take(&mut seat.reset_pressed);
             into.push(Command::Drive { slot, controls });
             seat.controls.buttons &= !buttons::RESET;
@@ -202,18 +201,26 @@ impl Seat {
             counts.missing = counts.missing.saturating_sub(1);
         }
         self.ack.fates.set(behind, InputFate::Superseded);
-        self.reset_pressed |= frame.controls.buttons & buttons::RESET != 0;
+        self.reset_pressed |= frame.controls.holds(buttons::RESET);
         counts.superseded += 1;
     }
 }
 
-/// The game reads buttons as the wire numbers them.
-const _: () = {
-    use pita_game::controls::buttons as game;
-    assert!(buttons::REVERSE == game::REVERSE && buttons::HANDBRAKE == game::HANDBRAKE);
-    assert!(buttons::RESET == game::RESET && buttons::BOOST == game::BOOST && buttons::JUMP == game::JUMP);
-    assert!(buttons::FIRE == game::FIRE && buttons::NEXT_WEAPON == game::NEXT_WEAPON);
-};
+/// Controls in the words of the game.
+fn to_game(input: &Controls) -> GameControls {
+    GameControls {
+        throttle: input.throttle.into(),
+        brake: input.brake.into(),
+        steer: input.steer.into(),
+        reverse: input.holds(buttons::REVERSE),
+        handbrake: input.holds(buttons::HANDBRAKE),
+        reset: input.holds(buttons::RESET),
+        boost: input.holds(buttons::BOOST),
+        jump: input.holds(buttons::JUMP),
+        fire: input.holds(buttons::FIRE),
+        next_weapon: input.holds(buttons::NEXT_WEAPON),
+    }
+}
 
 #[cfg(test)]
 mod tests;

@@ -29,7 +29,7 @@ pub use checks::ACTORS_MAX;
 pub use key::Key;
 pub use material::{MaterialFile, MaterialPairFile, Materials};
 pub use parameters::{ParameterFile, with_parameters};
-pub use precision::{PrecisionFile, STEPS_MAX};
+pub use precision::PrecisionFile;
 pub use shape::{Angles, ShapeFile};
 pub use shipped::shipped_file;
 pub use sleep::SleepFile;

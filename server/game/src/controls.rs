@@ -25,42 +25,7 @@ pub struct Controls {
     pub next_weapon: bool,
 }
 
-/// Bits of buttons, as the wire numbers them.
-pub mod buttons {
-    /// [`Controls::reverse`](super::Controls::reverse).
-    pub const REVERSE: u16 = 1 << 0;
-    /// [`Controls::handbrake`](super::Controls::handbrake).
-    pub const HANDBRAKE: u16 = 1 << 1;
-    /// [`Controls::reset`](super::Controls::reset).
-    pub const RESET: u16 = 1 << 2;
-    /// [`Controls::boost`](super::Controls::boost).
-    pub const BOOST: u16 = 1 << 3;
-    /// [`Controls::jump`](super::Controls::jump).
-    pub const JUMP: u16 = 1 << 4;
-    /// [`Controls::fire`](super::Controls::fire).
-    pub const FIRE: u16 = 1 << 5;
-    /// [`Controls::next_weapon`](super::Controls::next_weapon).
-    pub const NEXT_WEAPON: u16 = 1 << 6;
-}
-
 impl Controls {
-    /// What a client sent: throttle, brake and steering, and the [`buttons`] that are held.
-    pub fn from_input([throttle, brake, steer]: [f32; 3], held: u16) -> Self {
-        let holds = |button| held & button != 0;
-        Self {
-            throttle: throttle.into(),
-            brake: brake.into(),
-            steer: steer.into(),
-            reverse: holds(buttons::REVERSE),
-            handbrake: holds(buttons::HANDBRAKE),
-            reset: holds(buttons::RESET),
-            boost: holds(buttons::BOOST),
-            jump: holds(buttons::JUMP),
-            fire: holds(buttons::FIRE),
-            next_weapon: holds(buttons::NEXT_WEAPON),
-        }
-    }
-
     /// The same controls with every number in its range; what is no number counts as released.
     pub fn in_range(self) -> Self {
         let ratio = |x: f64, least: f64| if x.is_nan() { 0.0 } else { x.clamp(least, 1.0) };

@@ -22,7 +22,7 @@ impl ArenaFile {
         Key::new("max_players").count(self.max_players.into(), 1, 1_024, "players")?;
         Key::new("gravity").number(self.gravity, 0.0, 100.0, "m/s^2")?;
         self.check_bounds()?;
-        self.precision.check(self.bounds.reach_m())?;
+        self.precision.check()?;
         material::check(&self.materials, &self.material_pairs)?;
         self.vehicle.check(&Key::new("vehicle"))?;
         self.combat.as_ref().map_or(Ok(()), |combat| combat.check(&Key::new("combat")))?;

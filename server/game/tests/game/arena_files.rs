@@ -55,10 +55,8 @@ fn arenas_choose_how_fine_they_are_sent() {
     let expected = PrecisionFile { steps_per_m: Some(20_000), rotation_steps: None, joint_steps: Some(500) };
     assert_eq!(precision, Ok(expected));
     assert_eq!(with("").map(|arena| arena.precision()), Ok(PrecisionFile::default()));
-    // The bounds are 5 km without the table: 2^26 steps are less.
-    let Err(error) = with("[precision]\nsteps_per_m = 20000") else { panic!("accepted") };
-    let allowed = "allowed: 10 to 13421 steps a metre, for bounds 5000 m from the origin";
-    assert_eq!(error.to_string(), format!("precision.steps_per_m is 20000, {allowed}"));
+    let Err(error) = with("[precision]\nsteps_per_m = 70000") else { panic!("accepted") };
+    assert_eq!(error.to_string(), "precision.steps_per_m is 70000, allowed: 10 to 65536 steps a metre");
 }
 
 #[test]
