@@ -90,7 +90,7 @@ const BAD: &[(&str, &str, &[&str])] = &[
         "[bounds]\nmin = [-9, 0, -9]\nmax = [9, 9, 9]\n[materials",
         &["spawn_grids[0].corner[0] is -28", "-7.47", "a whole car is within the bounds"],
     ),
-    ("[materials", "[precision]\nsteps_per_m = 9\n[materials", &["precision.steps_per_m is 9", "10 to 13421"]),
+    ("[materials", "[precision]\nsteps_per_m = 9\n[materials", &["precision.steps_per_m is 9", "10 to 65536"]),
     ("[materials", "[precision]\nrotation_steps = 9000\n[materials", &["rotation_steps is 9000", "64 to 8192 steps"]),
     ("[materials", "[precision]\njoint_steps = 70000\n[materials", &["joint_steps is 70000", "10 to 65536"]),
     ("[materials", "[precision]\nrate = 1\n[materials", &["unknown field `rate`", "steps_per_m"]),

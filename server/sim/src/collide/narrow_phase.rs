@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::collision::{Closest, Phase, Touch};
 use super::fine_phase::FinePhase;
+use super::manifold::POINTS_MAX;
 use super::still::Still;
 use super::{ContactPoint, Partner, StaticId};
 use crate::dof::BodyId;
@@ -33,6 +34,11 @@ pub(super) struct Pair {
 }
 
 impl Pair {
+    /// With room for all points that most pairs ever have.
+    fn roomy() -> Self {
+        Self { points: Vec::with_capacity(POINTS_MAX), ..Self::default() }
+    }
+
     /// Nothing is known of it; what it has of memory it keeps.
     fn forget(&mut self) {
         let mut points = std::mem::take(&mut self.points);
@@ -211,9 +217,12 @@ impl NarrowPhase {
         spare.extend(last.extract_if(.., |known| is_gone(known.key)).filter_map(|known| known.pair));
     }
 
-    /// A pair of which nothing is known.
+    /// A pair of which nothing is known. Where there is none to spare as many are made as there are, as vectors do it.
     fn blank(&mut self) -> Box<Pair> {
-        let mut pair = self.spare.pop().unwrap_or_default();
+        let mut pair = self.spare.pop().unwrap_or_else(|| {
+            self.spare.extend((0..self.pairs.len()).map(|_| Box::new(Pair::roomy())));
+            Box::new(Pair::roomy())
+        });
         pair.forget();
         pair
     }

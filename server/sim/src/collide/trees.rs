@@ -20,6 +20,20 @@ type Tree = KdopTree<SLABS>;
 /// Two hulls, or a hull and a piece of static geometry, by their keys.
 pub(super) type Pair = [u32; 2];
 
+/// Two that may touch.
+#[derive(Clone, Copy)]
+struct Near {
+    /// The serials of both, the first one's above: what comes out is in this order.
+    order: u64,
+    pair: Pair,
+}
+
+impl Near {
+    fn new(pair: Pair, serials: [u32; 2]) -> Self {
+        Self { order: u64::from(serials[0]) << 32 | u64::from(serials[1]), pair }
+    }
+}
+
 /// Where a hull is kept.
 #[derive(Clone, Copy)]
 enum Place {
@@ -78,11 +92,11 @@ pub(super) struct Trees {
     fixed: Tree,
     sleeping: Tree,
     /// Pairs of hulls that may touch, the smaller serial first.
-    near: Vec<Pair>,
+    near: Vec<Near>,
     /// Hulls and pieces that may touch.
-    near_fixed: Vec<Pair>,
+    near_fixed: Vec<Near>,
     /// Hulls and sleepers that may touch.
-    near_sleeping: Vec<Pair>,
+    near_sleeping: Vec<Near>,
     search: PairSearch,
 }
 
@@ -101,9 +115,9 @@ impl Trees {
         self.entries.remove(key as usize);
         self.awake.retain(|&other| other != key);
         for pairs in [&mut self.near, &mut self.near_sleeping] {
-            pairs.retain(|pair| !pair.contains(&key));
+            pairs.retain(|near| !near.pair.contains(&key));
         }
-        self.near_fixed.retain(|pair| pair[0] != key);
+        self.near_fixed.retain(|near| near.pair[0] != key);
     }
 
     /// Takes a hull out of its tree.
@@ -157,7 +171,7 @@ impl Trees {
     pub fn remove_fixed(&mut self, key: u32) {
         let piece = self.pieces.remove(key as usize);
         self.fixed.remove(piece.leaf);
-        self.near_fixed.retain(|pair| pair[1] != key);
+        self.near_fixed.retain(|near| near.pair[1] != key);
     }
 
     /// Bodies that sleep within the bounds of a piece of static geometry.
@@ -212,23 +226,26 @@ impl Trees {
         let entry = |key: u32| &entries[key as usize];
         let serial = |key: u32| entry(key).hull.placed.serial;
         let strangers = |a: u32, b: u32| entry(a).hull.owner != entry(b).hull.owner;
-        near.retain(|pair| !pair.iter().any(|&key| entry(key).has_changed));
+        near.retain(|near| !near.pair.iter().any(|&key| entry(key).has_changed));
         search.within(dynamic, |a, b| {
             if strangers(a, b) {
-                near.push(if serial(a) < serial(b) { [a, b] } else { [b, a] });
+                let pair = if serial(a) < serial(b) { [a, b] } else { [b, a] };
+                near.push(Near::new(pair, pair.map(serial)));
             }
         });
-        near.sort_unstable_by_key(|pair| pair.map(serial));
-        near_fixed.retain(|&[hull, _]| !entry(hull).has_changed);
-        search.between(dynamic, fixed, |hull, piece| near_fixed.push([hull, piece]));
-        near_fixed.sort_unstable_by_key(|&[hull, piece]| (serial(hull), pieces[piece as usize].serial));
-        near_sleeping.retain(|pair| !pair.iter().any(|&key| entry(key).has_changed));
+        near_fixed.retain(|near| !entry(near.pair[0]).has_changed);
+        search.between(dynamic, fixed, |hull, piece| {
+            near_fixed.push(Near::new([hull, piece], [serial(hull), pieces[piece as usize].serial]));
+        });
+        near_sleeping.retain(|near| !near.pair.iter().any(|&key| entry(key).has_changed));
         search.between(dynamic, sleeping, |hull, sleeper| {
             if strangers(hull, sleeper) {
-                near_sleeping.push([hull, sleeper]);
+                near_sleeping.push(Near::new([hull, sleeper], [hull, sleeper].map(serial)));
             }
         });
-        near_sleeping.sort_unstable_by_key(|pair| pair.map(serial));
+        for pairs in [near, near_fixed, near_sleeping] {
+            pairs.sort_unstable_by_key(|near| near.order);
+        }
         for tree in [dynamic, fixed, sleeping] {
             tree.settle();
         }
@@ -268,23 +285,23 @@ impl Trees {
 
     /// All pairs of hulls that are awake and whose bounds overlap, whatever the round.
     pub fn pairs_awake(&self) -> impl Iterator<Item = Pair> {
-        self.near.iter().copied().filter(|&pair| self.overlap(pair))
+        self.near.iter().map(|near| near.pair).filter(|&pair| self.overlap(pair))
     }
 
     /// All hulls that are awake and pieces of static geometry whose bounds overlap, whatever the round.
     pub fn pairs_awake_with_fixed(&self) -> impl Iterator<Item = (u32, StaticId)> {
-        self.near_fixed.iter().filter_map(|&pair| self.overlap_with_fixed(pair))
+        self.near_fixed.iter().filter_map(|near| self.overlap_with_fixed(near.pair))
     }
 
     /// Pairs of hulls of this round whose bounds overlap, the smaller serial first; and of such hulls with sleepers, whose
     /// body is told.
     pub fn pairs(&self) -> impl Iterator<Item = (Pair, Option<BodyId>)> {
-        let near = self.near.iter().filter(|pair| pair.iter().all(|&key| self.arrives(key)));
-        let near = near.map(|&pair| (pair, None));
-        let sleeping = self.near_sleeping.iter();
+        let near = self.near.iter().map(|near| near.pair);
+        let near = near.filter(|pair| pair.iter().all(|&key| self.arrives(key))).map(|pair| (pair, None));
+        let sleeping = self.near_sleeping.iter().map(|near| near.pair);
         let sleeping =
-            sleeping.filter(|&&[hull, sleeper]| self.arrives(hull) && self.entries[sleeper as usize].sleeps());
-        let sleeping = sleeping.map(|&[a, b]| {
+            sleeping.filter(|&[hull, sleeper]| self.arrives(hull) && self.entries[sleeper as usize].sleeps());
+        let sleeping = sleeping.map(|[a, b]| {
             let [of_a, of_b] = [a, b].map(|key| self.hull(key).placed);
             (if of_a.serial < of_b.serial { [a, b] } else { [b, a] }, Some(of_b.body))
         });
@@ -293,8 +310,8 @@ impl Trees {
 
     /// Hulls of this round and pieces of static geometry whose bounds overlap, in order of serials.
     pub fn pairs_with_fixed(&self) -> impl Iterator<Item = (u32, StaticId)> {
-        let pairs = self.near_fixed.iter().filter(|pair| self.arrives(pair[0]));
-        pairs.filter_map(|&pair| self.overlap_with_fixed(pair))
+        let pairs = self.near_fixed.iter().map(|near| near.pair).filter(|pair| self.arrives(pair[0]));
+        pairs.filter_map(|pair| self.overlap_with_fixed(pair))
     }
 
     fn arrives(&self, key: u32) -> bool {

@@ -73,11 +73,13 @@ pub(crate) fn product_sub<const D: usize>(a: &Block<D>, b: &Block<D>, c: &mut Bl
     }
 }
 
-/// Cholesky factor L of a symmetric block, A = L Lᵀ; the strict upper triangle of the result is zero.
-/// `None` where a pivot is not above `floor` times its diagonal entry.
+/// Cholesky factor L of a symmetric block, A = L Lᵀ, with the reciprocals of its pivots on the diagonal: what is divided by
+/// them later is multiplied. The strict upper triangle is zero. `None` where a pivot is not above `floor` times its diagonal
+/// entry.
 pub(crate) fn cholesky<const D: usize>(a: &Block<D>, floor: f64) -> Option<Block<D>> {
     // Row by row of Lᵀ, in what is left of A: neighbours in memory are worked on together.
     let mut upper = transpose(a);
+    let mut reciprocals = [0.0; D];
     for j in 0..D {
         let mut row = upper[j];
         for above in &upper[..j] {
@@ -91,16 +93,17 @@ pub(crate) fn cholesky<const D: usize>(a: &Block<D>, floor: f64) -> Option<Block
         if !positive {
             return None;
         }
-        let root = pivot.sqrt();
+        reciprocals[j] = pivot.sqrt().recip();
         for i in 0..D {
-            upper[j][i] = if i < j { 0.0 } else { row[i] / root };
+            upper[j][i] = if i < j { 0.0 } else { row[i] * reciprocals[j] };
         }
-        upper[j][j] = root;
     }
-    Some(transpose(&upper))
+    let mut lower = transpose(&upper);
+    (0..D).for_each(|i| lower[i][i] = reciprocals[i]);
+    Some(lower)
 }
 
-/// X ← X L⁻ᵀ, L lower triangular: every row of X is a right-hand side.
+/// X ← X L⁻ᵀ, L a factor from [`cholesky`]: every row of X is a right-hand side.
 #[inline]
 pub(crate) fn forward_substitute_rows<const D: usize>(l: &Block<D>, x: &mut Block<D>) {
     // As columns, so that all right-hand sides are worked on together.
@@ -113,29 +116,29 @@ pub(crate) fn forward_substitute_rows<const D: usize>(l: &Block<D>, x: &mut Bloc
                 *x -= factor * known;
             }
         }
-        column.iter_mut().for_each(|x| *x /= row[i]);
+        column.iter_mut().for_each(|x| *x *= row[i]);
     }
     *x = transpose(&columns);
 }
 
-/// x ← L⁻¹ x, L lower triangular.
+/// x ← L⁻¹ x, L a factor from [`cholesky`].
 pub(crate) fn forward_substitute<const D: usize>(l: &Block<D>, x: &mut Entry<D>) {
     for i in 0..D {
         let mut s = x[i];
         for k in 0..i {
             s -= l[i][k] * x[k];
         }
-        x[i] = s / l[i][i];
+        x[i] = s * l[i][i];
     }
 }
 
-/// x ← L⁻ᵀ x, L lower triangular.
+/// x ← L⁻ᵀ x, L a factor from [`cholesky`].
 pub(crate) fn backward_substitute<const D: usize>(l: &Block<D>, x: &mut Entry<D>) {
     for i in (0..D).rev() {
         let mut s = x[i];
         for k in i + 1..D {
             s -= l[k][i] * x[k];
         }
-        x[i] = s / l[i][i];
+        x[i] = s * l[i][i];
     }
 }

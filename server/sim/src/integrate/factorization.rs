@@ -41,7 +41,7 @@ pub(super) struct Factorization<const D: usize> {
     /// `columns[rows[i]..rows[i + 1]]` are the columns of row i of L, all below i, ascending.
     rows: Vec<u32>,
     columns: Vec<u32>,
-    /// Cholesky factors of the pivots.
+    /// Cholesky factors of the pivots, as [`cholesky`] has them.
     diagonal: Vec<Block<D>>,
     /// Blocks below the diagonal, as `columns` has them.
     lower: Vec<Block<D>>,
@@ -198,12 +198,13 @@ impl<const D: usize> Factorization<D> {
     }
 }
 
-/// Cholesky factor of a diagonal block by itself; of its diagonal alone where rounding has made it indefinite.
+/// Cholesky factor of a diagonal block by itself, as [`cholesky`] has it; of its diagonal alone where rounding has made it
+/// indefinite.
 pub(super) fn own_factor<const D: usize>(a: &Block<D>) -> Block<D> {
     cholesky(a, 0.0).unwrap_or_else(|| {
         let mut l = zero();
         for i in 0..D {
-            l[i][i] = a[i][i].abs().max(f64::MIN_POSITIVE).sqrt();
+            l[i][i] = a[i][i].abs().max(f64::MIN_POSITIVE).sqrt().recip();
         }
         l
     })

@@ -20,7 +20,7 @@ use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 static COUNTER: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
 /// Ticks until every buffer has its size.
-const WARM_UP: usize = 200;
+const WARM_UP: usize = 400;
 const TICKS: usize = 100;
 
 const SHAPE: Shape = Shape::Capsule { half_length: 0.2, radius: 0.1 };

@@ -59,7 +59,7 @@ fn a_falling_heap_has_no_burst() {
         let (x, y) = (0.3 * f64::from(i % 3), 1.0 + 1.3 * f64::from(i));
         world.add_rigid_body(cube(DVec3::new(x, y, 0.2 * f64::from(i % 2)))).unwrap();
     }
-    for tick in 0..150 {
+    for tick in 0..300 {
         let report = world.step();
         assert!(!report.is_energy_burst(), "tick {tick}: {report:?}");
     }

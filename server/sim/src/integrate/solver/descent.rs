@@ -303,26 +303,33 @@ impl<const D: usize> Descent<D> {
         self.relinearise(problem, work);
         problem.propose(&self.step);
         work.told_potentials();
-        line_search::shorten(slopes.start, slopes.end, Walk::NEWTON, |alpha| self.slope_at(alpha, problem, work));
-        self.relinearise(problem, work)
+        let mut merit = None;
+        line_search::shorten(slopes.start, slopes.end, Walk::NEWTON, |alpha| {
+            let (slope, taken) = self.slope_at(alpha, problem, work);
+            merit = taken;
+            slope
+        });
+        merit.unwrap_or_else(|| self.relinearise(problem, work))
     }
 
     /// Searches along the step from `start`.
     fn search(&mut self, method: &mut dyn Solver<D>, problem: &mut Problem, work: &mut Work, slope: f64) {
-        let alpha = line_search::search(slope, method.walk(), |alpha| self.slope_at(alpha, problem, work));
+        let alpha = line_search::search(slope, method.walk(), |alpha| self.slope_at(alpha, problem, work).0);
         method.walked(alpha, &self.step, &self.residual);
     }
 
-    /// The directional derivative so many steps from `start`, J. What is frozen is left as it is, but where something bends.
-    fn slope_at(&mut self, alpha: f64, problem: &mut Problem, work: &mut Work) -> f64 {
+    /// The directional derivative so many steps from `start`, J. What is frozen is left as it is, but where something bends:
+    /// there the incremental potential comes with it, J.
+    fn slope_at(&mut self, alpha: f64, problem: &mut Problem, work: &mut Work) -> (f64, Option<f64>) {
         self.go(alpha, problem, work);
-        if self.bends {
-            self.relinearise(problem, work);
+        let merit = if self.bends {
+            Some(self.relinearise(problem, work))
         } else {
             problem.evaluate(&mut self.residual);
             work.evaluated();
-        }
-        inner(&self.residual, &self.step)
+            None
+        };
+        (inner(&self.residual, &self.step), merit)
     }
 
     /// Moves `u` and the trial so many steps from `start`.
