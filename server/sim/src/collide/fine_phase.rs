@@ -216,7 +216,7 @@ fn remember_points(
 ) {
     let single = manifold.reduced().len() == 1 && old.len() == 1;
     let normal = manifold.normal;
-    // Points of a pair share it: each by itself would stiffen for the load that its stiffness draws to it.
+    // Points of a pair share it.
     let stiffening = old.iter().map(|point| point.stiffening).fold(0.0, f64::max);
     for point in manifold.reduced() {
         let known = old.iter().position(|o| {

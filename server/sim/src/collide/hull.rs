@@ -62,6 +62,9 @@ pub(super) struct Hull {
     bend: f64,
     /// Of the hull and of all that a tick may do to it; empty where the body takes no part.
     pub bounds: Bound,
+    /// The last detection saw it at rest; and this one does, at the same place.
+    pub was_at_rest: bool,
+    pub keeps_still: bool,
     /// How the tick moves it, as far as the second look asks.
     pub stride: Stride,
     /// What it is in this tick where its vertices are embedded, and where the solver wants to put it.
@@ -82,12 +85,30 @@ impl Hull {
     pub fn new(placed: Placed, owner: u32) -> Self {
         let (pose, twist, spread, bounds) = (Pose::IDENTITY, Twist::REST, 0.0, Bound::EMPTY);
         let (flies, pivot, bend, stride) = (false, DVec3::ZERO, 0.0, Stride::default());
-        Self { placed, owner, pose, twist, spread, flies, pivot, bend, bounds, stride, deformed: None, ahead: None }
+        let (was_at_rest, keeps_still, deformed, ahead) = (false, false, None, None);
+        Self {
+            placed,
+            owner,
+            pose,
+            twist,
+            spread,
+            flies,
+            pivot,
+            bend,
+            bounds,
+            was_at_rest,
+            keeps_still,
+            stride,
+            deformed,
+            ahead,
+        }
     }
 
     /// Takes over where its body is now.
     pub fn follow(&mut self, bodies: Bodies, settings: &Settings) {
-        self.bounds = Bound::EMPTY;
+        let (pose, bounds) = (self.pose, std::mem::replace(&mut self.bounds, Bound::EMPTY));
+        let was_at_rest = std::mem::take(&mut self.was_at_rest);
+        self.keeps_still = false;
         let Some(body) = bodies.bodies.get(self.placed.body).filter(|body| !body.quarantined) else { return };
         match body.figure.as_ref().and_then(|figure| Some((figure, figure.hull(self.placed.index)?))) {
             None => {
@@ -100,6 +121,11 @@ impl Hull {
                 Motion { pose: self.pose, twist: self.twist, spread: self.spread } =
                     deformed.follow(hull, figure, state);
             }
+        }
+        self.was_at_rest = body.figure.is_none() && self.twist == Twist::REST;
+        if was_at_rest && self.was_at_rest && self.pose == pose {
+            (self.bounds, self.keeps_still) = (bounds, true);
+            return;
         }
         self.foresee(bodies, body, settings);
         if let Some(collider) = self.collider(bodies) {

@@ -157,6 +157,8 @@ pub(crate) struct ContactPoint {
     pub believed_gap: f64,
     /// Logic lets the pair pass in this tick.
     pub is_cancelled: bool,
+    /// The last tick left it as it was, and its bodies, too.
+    pub is_settled: bool,
     feature: u32,
 }
 
@@ -170,7 +172,7 @@ impl ContactPoint {
     fn fresh((a, b): Key, normal: DVec3, point: &ManifoldPoint, surface: Surface) -> Self {
         let ManifoldPoint { position, gap, feature } = *point;
         let (anchor, turn, blow, believed_gap) = (DVec3::ZERO, DVec3::ZERO, Blow::default(), gap);
-        let (normal_force, load, stiffening, is_cancelled) = (0.0, 0.0, 0.0, false);
+        let (normal_force, load, stiffening, is_cancelled, is_settled) = (0.0, 0.0, 0.0, false, false);
         Self {
             a,
             b,
@@ -186,8 +188,14 @@ impl ContactPoint {
             blow,
             believed_gap,
             is_cancelled,
+            is_settled,
             feature,
         }
+    }
+
+    /// What the integrator makes it remember, but for turns, and for the stiffening, which is the pair's.
+    pub fn memory(&self) -> (DVec3, f64, f64, Blow) {
+        (self.anchor, self.normal_force, self.load, self.blow)
     }
 
     /// Takes over what `old`, the same point in the last tick, remembers; stiffening is the pair's.
@@ -299,7 +307,17 @@ impl Detector {
         let start = self.contacts.partition_point(|contact| of_pair(contact) < touch.key);
         for contact in self.contacts[start..].iter_mut().take_while(|contact| of_pair(contact) == touch.key) {
             let (anchor, normal_force, load, blow) = (DVec3::ZERO, 0.0, 0.0, Blow::default());
-            *contact = ContactPoint { is_cancelled: true, anchor, normal_force, load, turn: anchor, blow, ..*contact };
+            let is_settled = false;
+            *contact = ContactPoint {
+                is_cancelled: true,
+                is_settled,
+                anchor,
+                normal_force,
+                load,
+                turn: anchor,
+                blow,
+                ..*contact
+            };
         }
         true
     }
@@ -381,17 +399,25 @@ impl Detector {
         self.ask_about_statics(bodies, settings);
         let Self { trees, statics, materials, narrow_phase, touched, .. } = self;
         touched.extend(narrow_phase.answer(threads, |question, fine_phase| {
-            let Some(a) = trees.hull(question.hull).moving(bodies) else { return };
+            let hull = trees.hull(question.hull);
+            let Some(a) = hull.moving(bodies) else { return };
             let surface = |collider: &Collider| materials.contact(a.collider.material(), collider.material());
             match question.other {
-                Other::Hull(hull, _) => {
-                    let Some(b) = trees.hull(hull).moving(bodies) else { return };
-                    question.wakes = fine_phase.bodies(&mut question.pair, [&a, &b], surface(b.collider), settings);
+                Other::Hull(other, sleeper) => {
+                    let other = trees.hull(other);
+                    let Some(b) = other.moving(bodies) else { return };
+                    let (pair, surface) = (&mut question.pair, surface(b.collider));
+                    let keeps_still = hull.keeps_still && other.keeps_still && sleeper.is_none();
+                    if !(keeps_still && pair.stays(surface)) {
+                        question.wakes = fine_phase.bodies(pair, [&a, &b], surface, settings);
+                    }
                 }
                 Other::Piece(id) => {
                     let Static { serial, ref collider, pose, .. } = statics[id];
-                    let (pair, piece) = (&mut question.pair, (serial, collider, pose));
-                    fine_phase.with_static(pair, &a, piece, surface(collider), settings);
+                    let (pair, surface) = (&mut question.pair, surface(collider));
+                    if !(hull.keeps_still && pair.stays(surface)) {
+                        fine_phase.with_static(pair, &a, (serial, collider, pose), surface, settings);
+                    }
                 }
             }
         }));

@@ -8,7 +8,7 @@ use super::collision::{Closest, Phase, Touch};
 use super::fine_phase::FinePhase;
 use super::manifold::POINTS_MAX;
 use super::still::Still;
-use super::{ContactPoint, Partner, StaticId};
+use super::{ContactPoint, Partner, StaticId, Surface};
 use crate::dof::BodyId;
 use crate::settings::Settings;
 use crate::threads::{Threads, Workspaces};
@@ -24,6 +24,8 @@ pub(super) struct Pair {
     pub normal: Option<DVec3>,
     /// What was found of it when it was last looked at.
     pub still: Option<Still>,
+    /// Ticks that it has been known for.
+    age: u32,
     /// That it sees only: its points are no contacts.
     pub is_sensor: bool,
     /// Where it touches in this tick, and where it did in the last.
@@ -48,8 +50,20 @@ impl Pair {
 
     /// Starts a tick.
     fn begin(&mut self, settings: &Settings) {
+        self.age = self.age.saturating_add(1);
         self.last_touch = self.touch.take();
         self.impulse = settings.dt * self.points.iter().map(|point| point.normal_force).sum::<f64>();
+    }
+
+    /// Whether another look, after [`Pair::begin`], would find of two colliders that keep still what the last one found,
+    /// with the memory that it has; then it stays as it is.
+    pub fn stays(&mut self, surface: Surface) -> bool {
+        let is_same = |point: &ContactPoint| point.is_settled && point.surface == surface;
+        let stays = self.age > 1 && !self.is_sensor && self.points.iter().all(is_same);
+        if stays {
+            self.touch = self.last_touch;
+        }
+        stays
     }
 
     /// What there is to tell of it, after [`Pair::begin`].
@@ -205,7 +219,9 @@ impl NarrowPhase {
     pub fn remember(&mut self, contacts: &[ContactPoint]) {
         let mut contacts = contacts.iter();
         for pair in self.pairs.iter_mut().map(|question| &mut question.pair).filter(|pair| !pair.is_sensor) {
-            pair.points.iter_mut().zip(&mut contacts).for_each(|(mine, theirs)| *mine = *theirs);
+            let of_pair = pair.points.iter_mut().zip(&mut contacts);
+            let changed = of_pair.filter(|(mine, theirs)| !(mine.is_settled && theirs.is_settled));
+            changed.for_each(|(mine, theirs)| *mine = *theirs);
         }
     }
 

@@ -134,6 +134,8 @@ impl Trees {
         self.take_out(key);
         let entry = &mut self.entries[key as usize];
         entry.hull.follow(bodies, settings);
+        // What it did in the tick in which it fell asleep no detection saw.
+        entry.hull.was_at_rest = false;
         entry.place = Place::Sleeping(self.sleeping.insert(key, entry.hull.bounds));
         entry.has_changed = true;
         self.changed.push(key);

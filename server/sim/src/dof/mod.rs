@@ -118,6 +118,8 @@ pub(crate) struct Body {
     pub torque: DVec3,
     /// What potentials did to its twist in the last tick.
     pub impulse: Twist,
+    /// Contact points that acted on it in the last tick in which it was awake; see `integrate/rest.rs`.
+    pub touching: u32,
     /// Velocity that the coming tick is expected to add to its own, m/s: detection looks so much farther ahead.
     pub surge: DVec3,
     /// Its index among the bodies that take part in this tick; [`ABSENT`] where it does not.

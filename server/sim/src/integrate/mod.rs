@@ -22,6 +22,7 @@ mod preconditioner;
 pub(crate) mod problem;
 mod pull_back;
 mod recovery;
+mod rest;
 mod second_look;
 mod solver;
 mod spots;

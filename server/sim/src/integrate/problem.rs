@@ -221,6 +221,11 @@ impl Problem {
         (self.is_parting, self.looked_again) = (false, false);
     }
 
+    /// Of bodies that stand still, this is where their solve ended.
+    pub(super) fn stand_still(&mut self, blocks: usize) {
+        self.solution.resize(blocks, [0.0; BLOCK_RATES_MAX]);
+    }
+
     /// Blocks of unknowns.
     pub fn len(&self) -> usize {
         self.unknowns.len()

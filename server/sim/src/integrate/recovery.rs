@@ -85,6 +85,7 @@ impl Solve {
             let contact = &mut scene.contacts[source as usize];
             contact.normal_force = finite_or_zero(DVec3::X * force).x;
             contact.load = contact.load.min(contact.normal_force);
+            contact.is_settled = false;
         }
     }
 }

@@ -5,7 +5,7 @@ use super::solver::SolveReport;
 use super::spots::{Active, Spot, second_spots};
 use super::step::{Integrator, Scene, Solve};
 use crate::collide::{Bodies, Candidates, Course, Detector};
-use crate::dof::BLOCK_RATES_MAX;
+use crate::dof::{BLOCK_RATES_MAX, Twist};
 
 /// Memory of solving on.
 #[derive(Default)]
@@ -51,6 +51,9 @@ impl Integrator {
                 positions.extend_from_slice(figure.map_or(scene.state.q(body.slice), |figure| &figure.q1));
                 rates.extend_from_slice(figure.map_or(scene.state.v(body.slice), |figure| &figure.v1));
                 return Course::Figure(start);
+            }
+            if let Some(Solve { rest: Some(_), .. }) = solve {
+                return Course::Body(body.pose(scene.state), Twist::REST);
             }
             if let Some(solve) = solve {
                 let frame = &solve.problem.frames[active.start as usize];

@@ -48,6 +48,13 @@ pub(super) struct Acting {
     potentials: Vec<(PotentialId, [Option<u32>; 2])>,
 }
 
+impl Acting {
+    /// The bodies that other potentials than contacts act on.
+    pub fn driven(&self) -> impl Iterator<Item = u32> {
+        self.potentials.iter().flat_map(|(_, bodies)| bodies.iter().flatten().copied())
+    }
+}
+
 impl Spot {
     /// The body that it is on.
     pub fn body(self) -> Option<u32> {
@@ -79,13 +86,18 @@ impl Integrator {
         let Acting { touching, potentials } = &mut self.acting;
         touching.clear();
         let mut end = 0;
-        // Points of a pair share the frames of its colliders; vertices beneath a point are its own.
-        let shares = |a: &ContactPoint, b: &ContactPoint| a.same_pair(b) && !is_embedded(scene, a);
-        for points in scene.contacts.chunk_by(shares) {
-            let start = end;
+        for points in scene.contacts.chunk_by(ContactPoint::same_pair) {
+            let (start, spots) = (end, contact_spots(scene, &points[0]));
             end += points.len() as u32;
-            let spots = contact_spots(scene, &points[0]);
-            touching.extend(spots.map(|spots| Touching { points: (start, end), spots }));
+            // Points of a pair share the frames of its colliders; vertices beneath a point are its own.
+            match spots {
+                Some(spots) if spots.iter().any(|spot| matches!(spot, Spot::Vertices(..))) => {
+                    let spots = points.iter().map(|point| contact_spots(scene, point));
+                    let of_point = |(i, spots)| Some(Touching { points: (i, i + 1), spots: spots? });
+                    touching.extend((start..).zip(spots).filter_map(of_point));
+                }
+                spots => touching.extend(spots.map(|spots| Touching { points: (start, end), spots })),
+            }
         }
         potentials.clear();
         potentials.extend(scene.potentials.awake().filter_map(|(id, [a, b])| {
@@ -208,17 +220,4 @@ fn spots(scene: &Scene, contact: &ContactPoint, feet: [Option<Foot>; 2]) -> Opti
 fn placed<'a>(scene: &'a Scene, serial: u32) -> Option<&'a Placed> {
     let place = scene.placed.binary_search_by_key(&serial, |placed| placed.serial).ok()?;
     Some(&scene.placed[place])
-}
-
-/// Whether one side of a contact is a hull that is embedded.
-fn is_embedded(scene: &Scene, contact: &ContactPoint) -> bool {
-    let embedded = |serial: u32| {
-        let placed = placed(scene, serial)?;
-        scene.bodies[placed.body].figure.as_ref()?.hull(placed.index)
-    };
-    let other = match contact.b {
-        Partner::Body(serial) => embedded(serial),
-        Partner::Static(_) => None,
-    };
-    other.or_else(|| embedded(contact.a)).is_some()
 }

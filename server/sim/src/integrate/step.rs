@@ -7,6 +7,7 @@ use slotmap::SlotMap;
 use super::StepReport;
 use super::gather::Sources;
 use super::problem::{Problem, Unknown};
+use super::rest::{Rest, RestSearch};
 use super::second_look::Onward;
 use super::solver::{SolveReport, Solvers, StoppedBecause};
 use super::spots::{Acting, Active};
@@ -70,6 +71,8 @@ pub(super) struct Solve {
     pub rolling: Vec<u32>,
     /// Body and index of each rod of a figure.
     pub own_rods: Vec<(BodyId, u32)>,
+    /// It rests: it is neither gathered nor solved.
+    pub rest: Option<Rest>,
     /// Energy of motion of the first solution where recovery has it solved a second time, J.
     pub first_energy: Option<f64>,
 }
@@ -83,6 +86,7 @@ pub(crate) struct Integrator {
     pub(super) acting: Acting,
     pub(super) solves: Vec<Solve>,
     pub(super) onward: Onward,
+    pub(super) rest_search: RestSearch,
     workspaces: Workspaces<Workspace>,
 }
 
@@ -94,6 +98,7 @@ impl Integrator {
         self.find_acting(scene);
         self.find_islands(scene);
         (0..self.islands.len()).for_each(|island| self.seat(island, scene));
+        self.find_rest(scene);
         self.solve(scene, None);
     }
 
@@ -156,6 +161,7 @@ impl Integrator {
         for &id in scene.order {
             let body = &mut scene.bodies[id];
             if let Some(active) = self.active.get(body.index as usize) {
+                body.touching = self.rest_search.touching[body.index as usize];
                 let solve = self.solves.get(self.islands.island_of(body.index) as usize);
                 land(body, active, solve, (scene.settings, scene.state), &mut report);
             }
@@ -198,6 +204,7 @@ fn land(
 ) {
     report.bodies += 1;
     match (&body.figure, solve) {
+        (None, Some(Solve { rest: Some(_), .. })) => report.dof += state.v(body.slice).len(),
         (None, solve) => {
             let twist = |solve: &Solve| solve.problem.frames[active.start as usize].twist();
             let solved = solve.and_then(|solve| Some((solve.node(active.start)?, twist(solve))));
@@ -253,7 +260,7 @@ impl Workspace {
 impl Solve {
     /// Starts an island anew, with bodies of so many blocks and nothing that acts on them.
     pub fn clear(&mut self, blocks: usize) {
-        (self.is_pending, self.blocks, self.first_energy) = (true, blocks, None);
+        (self.is_pending, self.blocks, self.rest, self.first_energy) = (true, blocks, None, None);
         self.report = SolveReport::default();
         self.touching.clear();
         self.potentials.clear();
@@ -266,24 +273,12 @@ impl Solve {
     /// Hands back what potentials remember, and looks how well they hold.
     fn write_back(&self, scene: &mut Scene, report: &mut StepReport) {
         let (problem, dt) = (&self.problem, self.problem.dt);
-        let is_solved = self.report.stopped_because == StoppedBecause::Tolerance;
-        let mut outcomes = problem.terms.contacts.iter().map(|term| term.outcome(dt, problem.pair(term)));
-        for (&source, outcome) in self.contacts.iter().zip(&mut outcomes) {
-            let Outcome { normal_force, depth, anchor, stiffening, blow } = outcome;
-            let contact = &mut scene.contacts[source as usize];
-            contact.anchor = finite_or_zero(anchor);
-            contact.blow = blow;
-            contact.stiffening = if stiffening.is_finite() { stiffening } else { 0.0 };
-            let normal_force = if normal_force.is_finite() { normal_force } else { 0.0 };
-            contact.load = normal_force.min(if is_solved { contact.normal_force } else { contact.load });
-            contact.normal_force = normal_force;
-            report.worst_penetration = report.worst_penetration.max(depth);
-        }
-        // Points of the second look live for one tick.
-        report.worst_penetration = outcomes.map(|outcome| outcome.depth).fold(report.worst_penetration, f64::max);
+        self.write_back_contacts(scene.contacts, report);
         for (term, &contact) in problem.terms.rolling.iter().zip(&self.rolling) {
-            let source = self.contacts[contact as usize];
-            scene.contacts[source as usize].turn = finite_or_zero(term.final_anchor(dt, problem.pair(term)));
+            let contact = &mut scene.contacts[self.contacts[contact as usize] as usize];
+            let turn = finite_or_zero(term.final_anchor(dt, problem.pair(term)));
+            let before = std::mem::replace(&mut contact.turn, turn);
+            contact.is_settled &= turn == before;
         }
         self.write_back_joints(scene.potentials, report);
         for (term, &(body, rod)) in problem.terms.own_rods.iter().zip(&self.own_rods) {
@@ -295,6 +290,42 @@ impl Solve {
         for term in &problem.terms.axles {
             report.worst_joint_gap = report.worst_joint_gap.max(term.gap(problem.pair(term)));
         }
+    }
+
+    /// What contacts remember. Points of a pair share the stiffest: each by itself would stiffen for the load that its
+    /// stiffness draws to it.
+    fn write_back_contacts(&self, contacts: &mut [ContactPoint], report: &mut StepReport) {
+        let (problem, dt) = (&self.problem, self.problem.dt);
+        let is_solved = self.report.stopped_because == StoppedBecause::Tolerance;
+        let mut outcomes = problem.terms.contacts.iter().map(|term| term.outcome(dt, problem.pair(term)));
+        let mut sources = &self.contacts[..];
+        while let [first, ..] = *sources {
+            let count =
+                sources.iter().take_while(|&&s| contacts[s as usize].same_pair(&contacts[first as usize])).count();
+            let (pair, others) = sources.split_at(count);
+            sources = others;
+            let mut stiffest = 0.0_f64;
+            for (&source, outcome) in pair.iter().zip(&mut outcomes) {
+                let Outcome { normal_force, depth, is_still, anchor, stiffening, blow } = outcome;
+                let contact = &mut contacts[source as usize];
+                let before = contact.memory();
+                contact.anchor = finite_or_zero(anchor);
+                contact.blow = blow;
+                let normal_force = if normal_force.is_finite() { normal_force } else { 0.0 };
+                contact.load = normal_force.min(if is_solved { contact.normal_force } else { contact.load });
+                contact.normal_force = normal_force;
+                contact.is_settled = is_still && contact.memory() == before;
+                stiffest = if stiffening.is_finite() { stiffest.max(stiffening) } else { stiffest };
+                report.worst_penetration = report.worst_penetration.max(depth);
+            }
+            for &source in pair {
+                let contact = &mut contacts[source as usize];
+                contact.is_settled &= contact.stiffening == stiffest;
+                contact.stiffening = stiffest;
+            }
+        }
+        // Points of the second look live for one tick.
+        report.worst_penetration = outcomes.map(|outcome| outcome.depth).fold(report.worst_penetration, f64::max);
     }
 
     /// What joints remember: there is a term for each on the list, in its order.
@@ -332,7 +363,9 @@ impl Solve {
     }
 
     fn sum_up(&self, report: &mut StepReport) {
-        report.contacts += self.problem.terms.contacts.len();
+        let rest = self.rest.unwrap_or_default();
+        report.contacts += self.problem.terms.contacts.len() + rest.contacts;
+        report.worst_penetration = report.worst_penetration.max(rest.depth);
         self.report.add_to(report);
         let SolveReport { residual, stopped_because, .. } = self.report;
         report.unconverged_islands += usize::from(stopped_because != StoppedBecause::Tolerance);
@@ -341,9 +374,9 @@ impl Solve {
     }
 }
 
-/// Gives every island the share of `budget` that its bodies and contacts are of all.
+/// Gives every island that does not rest the share of `budget` that its bodies and contacts are of all.
 fn share_budget(solves: &mut [Solve], budget: Option<u64>) {
-    let size = |solve: &Solve| (solve.blocks + solve.contacts.len()) as u128;
+    let size = |solve: &Solve| if solve.rest.is_some() { 0 } else { (solve.blocks + solve.contacts.len()) as u128 };
     let all: u128 = solves.iter().map(size).sum();
     for solve in solves {
         // No share is larger than the whole, so it fits.

@@ -341,6 +341,7 @@ impl ContactTerm {
         Outcome {
             normal_force,
             depth: depth + self.excess_depth,
+            is_still: DVec3::from(displacement) == DVec3::ZERO,
             anchor: self.final_anchor(displacement, normal_force),
             stiffening: self.final_stiffening(depth, normal_force),
             blow: self.final_blow(-displacement.along(self.normal) / dt, normal_force * dt),
@@ -378,6 +379,8 @@ pub(crate) struct Outcome {
     pub normal_force: f64,
     /// Depth, m; negative where it is open.
     pub depth: f64,
+    /// Its bodies did not move against each other there.
+    pub is_still: bool,
     /// The slip, pulled along at the cone, m.
     pub anchor: DVec3,
     /// How much stiffer than the settings' it is to be, so that the load takes up its share of the tolerance.

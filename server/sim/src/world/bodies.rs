@@ -104,7 +104,7 @@ impl World {
         let (slice, serial) = (self.state.allocate(size.0, size.1), self.serials);
         self.serials += 1;
         let (force, torque, impulse, surge, index) = (DVec3::ZERO, DVec3::ZERO, Twist::REST, DVec3::ZERO, ABSENT);
-        let (wheel_axis, wheel_turn, quarantined) = (None, DVec3::ZERO, false);
+        let (wheel_axis, wheel_turn, quarantined, touching) = (None, DVec3::ZERO, false, 0);
         let (rest, asleep) = (Rest::new(size.1), None);
         let (colliders, figure) = (Vec::new(), None);
         let id = self.bodies.insert(Body {
@@ -118,6 +118,7 @@ impl World {
             force,
             torque,
             impulse,
+            touching,
             surge,
             index,
             wheel_axis,

@@ -63,7 +63,8 @@ fn every_solver_comes_to_the_same_end() {
             for tick in 0..ticks {
                 let report = world.step();
                 assert_eq!(report.unconverged_islands, 0, "{name}, {solver:?}, tick {tick}: {report:?}");
-                assert!(report.residual <= 1e-7 && report.work > 0, "{name}, {solver:?}: {report:?}");
+                let works = report.work > 0 || report.evaluations == 0;
+                assert!(report.residual <= 1e-7 && works, "{name}, {solver:?}: {report:?}");
             }
             state(&world)
         };
