@@ -182,6 +182,7 @@ struct Summary {
     sporadic: usize,
     /// Actors that were put back, or taken away, because they left the bounds or were quarantined.
     lost: usize,
+    expired: usize,
     state_hash: u64,
 }
 
@@ -202,6 +203,7 @@ impl Summary {
             worst_gain: 0.0,
             sporadic: 0,
             lost: 0,
+            expired: 0,
             state_hash: 0,
         }
     }
@@ -229,6 +231,7 @@ impl Summary {
         self.fastest = speeds.fold(self.fastest, f64::max);
         self.sporadic += logic.sporadic;
         self.lost += logic.lost;
+        self.expired += logic.expired;
     }
 
     fn finish(&mut self, world: &World) {
@@ -278,6 +281,7 @@ impl Summary {
             "energy_bursts": self.bursts,
             "worst_energy_gain_J": self.worst_gain,
             "lost_actors": self.lost,
+            "expired_actors": self.expired,
             "sporadic_jobs_per_tick": self.mean(self.sporadic),
             // A 64-bit hash does not survive readers that know numbers only as f64.
             "state_hash": format!("{:016x}", self.state_hash),
@@ -319,7 +323,7 @@ impl Summary {
             ("quarantined bodies", self.total.quarantined.to_string()),
             ("fastest body, most energy of motion", format!("{:.1} m/s, {:.3e} J", self.fastest, self.liveliest)),
             ("energy bursts, most gained in a tick", format!("{}, {:.3e} J", self.bursts, self.worst_gain)),
-            ("actors lost", self.lost.to_string()),
+            ("actors lost, expired at the bounds", format!("{}, {}", self.lost, self.expired)),
             ("sporadic jobs a tick", format!("{:.2}", self.mean(self.sporadic))),
             ("state hash", format!("{:016x}", self.state_hash)),
         ];

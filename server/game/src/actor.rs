@@ -89,6 +89,9 @@ pub enum WhenLost {
     /// It is gone.
     #[default]
     Remove,
+    /// It is gone, and that is how it ends where it leaves the bounds: a shot over the wall. Counted as
+    /// [`LogicReport::expired`](crate::LogicReport::expired) then, not as lost.
+    Expire,
     /// [`Actor::place`] puts it there.
     Home(Pose),
     /// [`Actor::place`] puts it to a free spawn point.

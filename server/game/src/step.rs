@@ -100,6 +100,8 @@ pub struct LogicReport {
     pub removed: usize,
     /// Actors that left the bounds, were quarantined, or could not go on: put back, or gone.
     pub lost: usize,
+    /// Actors that ended at the bounds, as such as they do: [`WhenLost::Expire`](crate::WhenLost::Expire).
+    pub expired: usize,
     /// Effects.
     pub effects: usize,
     /// What was asked for and could not be had: an actor that the engine refused or that is one too many, a message to

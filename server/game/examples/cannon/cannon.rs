@@ -2,7 +2,7 @@
 
 use pita_game::arena_file::{ArenaError, ArenaFile, Key};
 use pita_game::assembly::{Assembly, Piece};
-use pita_game::{Actor, ActorInfo, ActorKind, Contact, Message, Partner, Pose, Response, Site, Step};
+use pita_game::{Actor, ActorInfo, ActorKind, Contact, Message, Partner, Pose, Response, Site, Step, WhenLost};
 use pita_sim::{BodyId, DVec3, Shape, SimError, World};
 use serde::Deserialize;
 
@@ -127,5 +127,9 @@ impl Actor for Ball {
             step.remove_self();
         }
         Ok(())
+    }
+
+    fn when_lost(&self) -> WhenLost {
+        WhenLost::Expire
     }
 }

@@ -25,15 +25,20 @@ impl Arena {
 
     /// Whom the world lost: an actor that left the bounds, or of which the engine took a body out of the world.
     fn find_lost(&mut self) {
-        let Self { actors, world, bounds, lost, .. } = self;
+        let Self { actors, world, bounds, lost, logic, .. } = self;
         let is_broken = |&body: &BodyId| world.position(body).is_none() || world.is_quarantined(body);
-        let is_lost = |actor: &dyn Actor| !is_inside(world, bounds, actor) || actor.bodies().iter().any(is_broken);
-        lost.extend(actors.iter().filter(|(_, actor)| is_lost(&***actor)).map(|(&id, _)| id));
+        for (&id, actor) in actors {
+            let is_broken = actor.bodies().iter().any(is_broken);
+            if is_broken || !is_inside(world, bounds, &**actor) {
+                let expires = !is_broken && actor.when_lost() == WhenLost::Expire;
+                *if expires { &mut logic.expired } else { &mut logic.lost } += 1;
+                lost.push(id);
+            }
+        }
     }
 
     fn see_to_lost(&mut self) {
         let mut lost = std::mem::take(&mut self.lost);
-        self.logic.lost += lost.len();
         for id in lost.drain(..) {
             self.put_back(id);
         }
@@ -44,7 +49,7 @@ impl Arena {
     fn put_back(&mut self, id: u32) {
         let pose = match self.actors.get(&id).map(|actor| actor.when_lost()) {
             None => return,
-            Some(WhenLost::Remove) => return self.remove(id),
+            Some(WhenLost::Remove | WhenLost::Expire) => return self.remove(id),
             Some(WhenLost::Home(pose)) => pose,
             Some(WhenLost::Spawn) => self.free_spawn(id),
         };
@@ -83,6 +88,7 @@ impl Arena {
             let before = step.report.sporadic;
             step.id = id;
             if actor.step(&mut step).is_err() {
+                step.report.lost += 1;
                 self.lost.push(id);
             }
             let of_kind = self.logic_by_kind.entry(actor.describe().kind).or_default();

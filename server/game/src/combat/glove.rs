@@ -7,7 +7,7 @@ use pita_sim::{
 
 use super::Muzzle;
 use super::parameters::GloveParameters;
-use crate::actor::{Actor, ActorInfo, Contact, Partner, Response};
+use crate::actor::{Actor, ActorInfo, Contact, Partner, Response, WhenLost};
 use crate::part::PartInfo;
 use crate::step::{Message, Step};
 
@@ -145,5 +145,9 @@ impl Actor for Glove {
         }
         self.age += step.dt;
         self.foresee(step.world)
+    }
+
+    fn when_lost(&self) -> WhenLost {
+        WhenLost::Expire
     }
 }

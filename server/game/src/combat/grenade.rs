@@ -8,7 +8,7 @@ use pita_sim::{
 
 use super::parameters::GrenadeParameters;
 use super::{Muzzle, Release};
-use crate::actor::{Actor, ActorInfo, Contact, Partner, Response};
+use crate::actor::{Actor, ActorInfo, Contact, Partner, Response, WhenLost};
 use crate::part::PartInfo;
 use crate::step::{Message, Step};
 
@@ -122,5 +122,9 @@ impl Actor for Grenade {
         }
         self.burst(step)?;
         super::end(step)
+    }
+
+    fn when_lost(&self) -> WhenLost {
+        WhenLost::Expire
     }
 }

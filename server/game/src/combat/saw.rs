@@ -6,7 +6,7 @@ use pita_sim::{BodyId, Collider, DQuat, DVec3, Material, Phase, RigidBodyDesc, S
 
 use super::parameters::SawParameters;
 use super::{Muzzle, Release};
-use crate::actor::{Actor, ActorInfo, Contact, Partner, Response};
+use crate::actor::{Actor, ActorInfo, Contact, Partner, Response, WhenLost};
 use crate::part::PartInfo;
 use crate::step::{Message, Step};
 
@@ -112,5 +112,9 @@ impl Actor for Saw {
         }
         self.life -= step.dt;
         Ok(())
+    }
+
+    fn when_lost(&self) -> WhenLost {
+        WhenLost::Expire
     }
 }

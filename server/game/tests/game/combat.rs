@@ -140,6 +140,35 @@ fn a_grenade_bursts_and_throws_what_is_around() {
     assert!(highest > before.y + 0.05 && moved > 0.2, "{highest} m high, {moved} m off");
 }
 
+/// Over the wall is no loss: a shot ends at the bounds. What leaves them otherwise is lost.
+#[test]
+fn a_shot_ends_at_the_bounds() {
+    let bounds = "[bounds]\nmin = [-40.0, -20.0, -40.0]\nmax = [40.0, 30.0, 40.0]\n";
+    for weapon in ["saw", "grenade"] {
+        let keys = format!(
+            "[combat]\nweapons = [\"{weapon}\"]\nsaw.life = 60.0\ngrenade = {{ fuse = 60.0, reload = 60.0 }}\n"
+        );
+        let flat = FLAT.replace("count = [8, 8]", "count = [1, 1]");
+        let mut track = TestTrack::new(&format!("{flat}{bounds}{keys}"), SETTINGS);
+        track.enter(0);
+        track.run(1.0, COAST);
+        let at = track.car(0).position;
+        track.place(0, DVec3::new(30.0, at.y, 0.0), DQuat::IDENTITY, DVec3::ZERO);
+        let (mut lost, mut expired) = (0, 0);
+        for tick in 0..60 {
+            track.drive(0, if tick < 2 { FIRE } else { FULL_BRAKE });
+            track.tick();
+            let logic = track.arena.logic();
+            (lost, expired) = (lost + logic.lost, expired + logic.expired);
+        }
+        assert_eq!((lost, expired, kinds(&track)), (0, 1, vec!["vehicle"]), "{weapon}");
+        track.place(0, DVec3::new(50.0, at.y, 0.0), DQuat::IDENTITY, DVec3::ZERO);
+        track.tick();
+        let logic = track.arena.logic();
+        assert_eq!((logic.lost, logic.expired), (1, 0), "the car is put back");
+    }
+}
+
 #[test]
 fn nothing_is_fired_faster_than_it_reloads_and_nothing_where_nobody_fights() {
     let mut track = duel("weapons = [\"saw\"]\nsaw.reload = 1.0\nsaw.life = 60.0", 60.0);
