@@ -45,8 +45,8 @@ fn sheep_fly_and_come_down() {
     let mut track = TestTrack::new(PASTURE, SETTINGS);
     let sheep = slices(&track, "sheep");
     assert_eq!((sheep.len(), slices(&track, "tornado").len()), (40, 1));
-    let mut flown = BTreeSet::new();
-    for tick in 0..40 * 30 {
+    let (mut flown, mut landed) = (BTreeSet::new(), BTreeSet::new());
+    for tick in 0..100 * 30 {
         track.tick();
         let world = track.arena.world();
         assert_eq!(world.report().quarantined, 0, "tick {tick}: {:?}", world.report());
@@ -56,10 +56,13 @@ fn sheep_fly_and_come_down() {
             assert!(at.y > 0.0 && at.y < 30.0 && speed < 40.0, "tick {tick}: a sheep at {at} with {speed} m/s");
             if at.y > 5.0 {
                 flown.insert(slice.serial);
+            } else if at.y < 1.5 && flown.contains(&slice.serial) {
+                landed.insert(slice.serial);
             }
         }
+        if tick > 40 * 30 && flown == landed {
+            break;
+        }
     }
-    assert!(flown.len() >= 3, "{} sheep flew", flown.len());
-    let up = track.arena.world().slices().filter(|slice| flown.contains(&slice.serial) && slice.q[1] > 5.0).count();
-    assert!(up < flown.len(), "all of {up} are still up");
+    assert!(flown.len() >= 3 && flown == landed, "{flown:?} flew, {landed:?} came down");
 }

@@ -104,6 +104,25 @@ fn sheep_flee_a_car() {
     assert!(afraid > 3.0 && fearless < 2.7, "{afraid} m and {fearless} m");
 }
 
+/// A tornado that comes near is fled like a car: they keep out of its reach, unless they fear nothing.
+#[test]
+fn sheep_flee_a_tornado() {
+    let left = |fear: &str| {
+        let tornado = "[[actors]]\nkind = \"tornado\"\nname = \"twister\"\nposition = [-10.0, 0.0, 31.0]\naway_time = 0.0\n\
+                       legs = [{ to = [20.0, 0.0, 31.0], frequency = 0.05 }]\n";
+        let text = format!("{FLAT}{WOOL}{}{tornado}", flock(2, [20.0, 30.0], fear));
+        let mut track = TestTrack::new(&text, SETTINGS);
+        let mut highest = 0.0f64;
+        for _ in 0..30 * 12 {
+            track.tick();
+            highest = stand(&track).iter().fold(highest, |most, (at, _)| most.max(at.y));
+        }
+        highest
+    };
+    let (afraid, fearless) = (left("fear_radius = 16.0"), left("fear_radius = 0.0"));
+    assert!(afraid < 1.5 && fearless > 5.0, "{afraid} m and {fearless} m high");
+}
+
 /// Who fears nothing is run over by a car at full speed, flies no faster than twice that, and gets up. What a car does to
 /// the legs of a sheep differs from centimetre to centimetre, so it stands at ten places. Joints are stiff or have no way to
 /// open but in ticks that end at the cap of iterations: of a rigid sheep they open by more than 5 cm at one place in five.

@@ -200,3 +200,46 @@ fn roll_overs_end_on_wheels() {
         assert_eq!(track.quarantined(), 0);
     }
 }
+
+/// Pushed under a board, and put between walls that are nearer to one another than it is wide: it stands, brakes or not,
+/// and what its state says of its motion is how it moves.
+#[test]
+fn who_is_wedged_in_stands_still() {
+    let block = |half: [f64; 3], position: [f64; 3], keys: &str| {
+        format!("[[statics]]\nshape.box.half = {half:?}\nmaterial = \"asphalt\"\nposition = {position:?}\n{keys}\n")
+    };
+    let board = block([6.0, 0.2, 3.0], [60.0, 1.3, 0.0], "pitch = 12.0");
+    let walls: String = [-1.0, 1.0].map(|side| block([6.0, 1.0, 0.5], [60.0, 1.0, side * 1.3], "")).concat();
+    for (what, statics, x, push) in [
+        ("board", &board, 1.0, 0.0),
+        ("board", &board, 5.0, 12.0),
+        ("walls", &walls, 0.0, 0.0),
+        ("walls", &walls, 5.0, 0.0),
+    ] {
+        for controls in [COAST, FULL_BRAKE, FULL_THROTTLE] {
+            let mut track = track(statics);
+            track.place(
+                0,
+                DVec3::new(60.0 + x, 0.54, 0.0),
+                DQuat::from_rotation_y(std::f64::consts::PI),
+                DVec3::NEG_X * push,
+            );
+            track.run(3.0, controls);
+            let (mut fastest, mut unmoved, from) = (0.0f64, 0.0f64, track.car(0).position);
+            for _ in 0..60 {
+                let before = track.car(0).position;
+                track.run(1.0 / 30.0, controls);
+                let car = track.car(0);
+                fastest = fastest.max(car.velocity.length());
+                unmoved = unmoved.max((car.velocity - (car.position - before) * 30.0).length());
+            }
+            let moved = track.car(0).position.distance(from);
+            // Wheels that spin may work it loose.
+            let stands = controls.throttle > 0.0 || fastest < 0.01 && moved < 0.001;
+            assert!(
+                stands && unmoved < 0.01,
+                "{what}, {x} m, {push} m/s, {controls:?}: {fastest} m/s, {unmoved} without moving, {moved} m"
+            );
+        }
+    }
+}
