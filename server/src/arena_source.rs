@@ -76,8 +76,24 @@ impl ArenaText {
                 Self::of_file(Path::new(source), text)
             }
         };
-        let text = arena_file::with_parameters(&found.text, given).map_err(|reason| found.invalid(reason))?;
-        Ok(Self { text, ..found })
+        found.with(given)
+    }
+
+    /// The same with `given` in place of the defaults of its parameters.
+    ///
+    /// # Errors
+    /// [`SourceError::Invalid`].
+    pub fn with(&self, given: &BTreeMap<String, i64>) -> Result<Self, SourceError> {
+        let text = arena_file::with_parameters(&self.text, given).map_err(|reason| self.invalid(reason))?;
+        Ok(Self { text, ..self.clone() })
+    }
+
+    /// The farthest that its parameters may be chosen: [`arena_file::extremes`].
+    ///
+    /// # Errors
+    /// [`SourceError::Invalid`].
+    pub fn extremes(&self) -> Result<Vec<BTreeMap<String, i64>>, SourceError> {
+        arena_file::extremes(&self.text).map_err(|reason| self.invalid(reason))
     }
 
     /// An arena that is compiled in.

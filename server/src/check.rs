@@ -130,8 +130,20 @@ fn check_server(file: String, kind: Kind, text: &str) -> Checked {
 }
 
 fn check_arena(file: String, text: &ArenaText) -> Checked {
-    let problem = text.build(&ArenaSettings { tick_hz: 30, threads: 1 }).err().map(|error| error.to_string());
-    Checked { file, kind: Kind::Arena, problem }
+    Checked { file, kind: Kind::Arena, problem: problem_of(text).err() }
+}
+
+/// Builds an arena as it is, and with its parameters as far as they may be chosen.
+fn problem_of(text: &ArenaText) -> Result<(), String> {
+    let settings = ArenaSettings { tick_hz: 30, threads: 1 };
+    text.build(&settings).map_err(|error| error.to_string())?;
+    for given in text.extremes().map_err(|error| error.to_string())? {
+        text.with(&given).and_then(|text| text.build(&settings)).map_err(|error| {
+            let given: Vec<_> = given.iter().map(|(name, value)| format!("--set {name}={value}")).collect();
+            format!("{error} (with {})", given.join(" "))
+        })?;
+    }
+    Ok(())
 }
 
 fn json_of(checked: &[Checked]) -> String {
@@ -149,4 +161,21 @@ fn table_of(checked: &[Checked]) -> String {
         table.add_row([c.file.as_str(), c.kind.name(), c.problem.as_deref().unwrap_or("ok")]);
     }
     table.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is built in is good however its parameters are chosen; what is bad at the end of one is told so.
+    #[test]
+    fn parameters_are_checked_to_their_ends() {
+        for (name, text) in BUILT_IN {
+            assert_eq!(check_arena(String::new(), &ArenaText::built_in(name, text)).problem, None, "{name}");
+        }
+        let (_, stress) = BUILT_IN[3];
+        let wide = stress.replace("max = 48", "max = 400");
+        let problem = check_arena(String::new(), &ArenaText::built_in("stress", &wide)).problem.unwrap();
+        assert!(problem.contains("actors[0]") && problem.ends_with("(with --set size=400)"), "{problem}");
+    }
 }

@@ -18,6 +18,7 @@ mod shipped;
 mod sleep;
 mod solver;
 mod tables;
+mod warp;
 
 use std::collections::BTreeMap;
 
@@ -28,13 +29,14 @@ pub use block::Block;
 pub use checks::ACTORS_MAX;
 pub use key::Key;
 pub use material::{MaterialFile, MaterialPairFile, Materials};
-pub use parameters::{ParameterFile, with_parameters};
+pub use parameters::{ParameterFile, extremes, with_parameters};
 pub use precision::PrecisionFile;
 pub use shape::{Angles, ShapeFile};
 pub use shipped::shipped_file;
 pub use sleep::SleepFile;
 pub use solver::SolverFile;
 pub use tables::{ActorFile, ArenaFile, BoundsFile, RouteFile, SpawnFile, SpawnGridFile, StaticFile};
+pub use warp::{WarpFile, WarpKeyFile, check_warp, key_frames};
 
 /// Longest arena file, bytes: a bound on what reading it can cost.
 pub const FILE_MAX: usize = 1 << 20;

@@ -111,8 +111,7 @@ impl Arena {
 
     fn add_statics(&mut self, file: &ArenaFile) -> Result<(), ArenaError> {
         for (i, piece) in file.statics.iter().enumerate() {
-            let surface = || piece.surface.clone().map(Shape::Mesh);
-            let Some(shape) = piece.shape.as_ref().map(Shape::from).or_else(surface) else {
+            let Some(shape) = piece.collides() else {
                 return Key::new("statics").index(i).require(false, "a mesh", "a shape: this arena has no folder");
             };
             let collider = Collider::new(shape.clone(), material(&self.materials, &piece.material));

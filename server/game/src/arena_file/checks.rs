@@ -1,6 +1,6 @@
 //! The ranges of an arena file, and that its names refer to something.
 
-use super::{ArenaError, ArenaFile, BoundsFile, Key, material, meshes};
+use super::{ArenaError, ArenaFile, BoundsFile, Key, ShapeFile, material, meshes};
 
 /// Most statics and spawn points each, copies and grids counted.
 const THINGS_MAX: usize = 4_096;
@@ -70,6 +70,12 @@ impl ArenaFile {
                 (Some(shape), None) => shape.check(&key.at("shape"))?,
                 (None, Some(name)) => meshes::check_name(&key.at("mesh"), name)?,
                 _ => key.require(false, "without a shape, or with two", "either shape or mesh")?,
+            }
+            if let Some(warp) = &file.warp {
+                let key = key.at("warp");
+                let has_corners = matches!(file.shape, None | Some(ShapeFile::Box { .. }));
+                key.require(has_corners, "of what has no corners", "of a mesh or a box")?;
+                warp.check(&key)?;
             }
             self.check_material(&key.at("material"), &file.material)?;
             key.at("position").vector(file.position, WORLD_MAX)?;

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use pita_sim::collide::TriangleMesh;
 use pita_sim::geometry::Geometry;
 
-use super::{ArenaError, ArenaFile, Key};
+use super::{ArenaError, ArenaFile, Key, WarpFile};
+use crate::free_form;
 
 /// Most triangles of an arena: the description that clients join with has a hull for each, and 2 MiB for all.
 const TRIANGLES_MAX: usize = 16_384;
@@ -31,9 +32,13 @@ impl ArenaFile {
             let copies = piece.block().count();
             let Some(name) = &piece.mesh else { continue };
             let key = Key::new("statics").index(i).at("mesh");
-            let surface = match known.get(name) {
+            let plain = match known.get(name) {
                 Some(surface) => surface.clone(),
                 None => known.entry(name.clone()).or_insert(surface(&key, name, &read)?).clone(),
+            };
+            let surface = match piece.warp {
+                Some(warp) => warped(&key, &plain, warp)?,
+                None => plain,
             };
             triangles += copies * surface.triangles().len();
             key.count(triangles, 1, TRIANGLES_MAX, "triangles, those of copies and earlier meshes included")?;
@@ -52,6 +57,15 @@ fn surface(
     let bytes = read(name).map_err(|reason| key.refuse(name, &format!("a readable file ({reason})")))?;
     let surface = Geometry::from_file(name, &bytes).and_then(|geometry| geometry.surface());
     surface.map(Arc::new).map_err(|source| ArenaError::Engine { key: format!("{key}, {name}"), source })
+}
+
+/// The surface of the static at `key` with its points deformed.
+fn warped(key: &Key, plain: &TriangleMesh, warp: WarpFile) -> Result<Arc<TriangleMesh>, ArenaError> {
+    let mut points = plain.vertices().to_vec();
+    let lowest = points.iter().map(|point| point.y).fold(f64::INFINITY, f64::min);
+    free_form::deform(&warp.free_form(lowest), &mut points);
+    let surface = TriangleMesh::new(&points, plain.triangles());
+    surface.map(Arc::new).map_err(|source| ArenaError::Engine { key: format!("{key}, warped"), source })
 }
 
 /// `Err` unless `name` leads to nowhere but the arena's folder and those below it.

@@ -4,15 +4,17 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::DVec3;
+use pita_sim::Shape;
 use pita_sim::collide::TriangleMesh;
 use serde::Deserialize;
 
 use super::block::Block;
 use super::{
     AiFile, Angles, DriverFile, MaterialFile, MaterialPairFile, ParameterFile, PrecisionFile, ShapeFile, SleepFile,
-    SolverFile,
+    SolverFile, WarpFile,
 };
 use crate::combat::CombatParameters;
+use crate::free_form;
 use crate::vehicle::VehicleParameters;
 
 /// A whole file.
@@ -120,6 +122,8 @@ pub struct StaticFile {
     /// What [`ArenaFile::read_meshes`] read.
     #[serde(skip)]
     pub surface: Option<Arc<TriangleMesh>>,
+    /// How its points are deformed, those of a mesh or a box; what is lowest of it stays where it is.
+    pub warp: Option<WarpFile>,
     /// Name of its material.
     pub material: String,
     /// Its centre, m.
@@ -146,6 +150,14 @@ impl StaticFile {
     /// The block that it is one of, or all of.
     pub fn block(&self) -> Block {
         Block { first: self.position, copies: self.copies, spacing: self.spacing }
+    }
+
+    /// What it collides with; `None` for a mesh that was not read.
+    pub fn collides(&self) -> Option<Shape> {
+        let Some(shape) = self.shape.as_ref().map(Shape::from) else { return self.surface.clone().map(Shape::Mesh) };
+        let Some(warp) = self.warp else { return Some(shape) };
+        let lowest = if let Shape::Box { half } = shape { -half.y } else { 0.0 };
+        free_form::deform_shape(&warp.free_form(lowest), &shape)
     }
 
     /// Its angles.

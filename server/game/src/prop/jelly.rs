@@ -1,4 +1,5 @@
-//! A jelly: an elastic block in a lattice, which wobbles, and springs back when it is driven through.
+//! A jelly: an elastic block in a lattice, which wobbles, and springs back when it is driven through. With key-frames it
+//! dances: they deform what it is at rest, and elasticity takes it there.
 
 use std::sync::{Arc, OnceLock};
 
@@ -8,10 +9,12 @@ use pita_sim::{BodyId, DVec3, EmbeddedHull, FigureDesc, Lattice, LatticeDesc, Ma
 use serde::Deserialize;
 
 use crate::actor::{Actor, ActorInfo, WhenLost};
-use crate::arena_file::{ArenaError, ArenaFile, Key};
+use crate::arena_file::{ArenaError, ArenaFile, Key, WarpKeyFile, check_warp, key_frames};
+use crate::free_form::{KeyFrames, Warp};
 use crate::kinds::{ActorKind, Site};
 use crate::part::PartInfo;
 use crate::spawn::Pose;
+use crate::step::Step;
 
 /// Poisson's ratio: nearly, but not quite, as incompressible as water; cells of a lattice lock nearer to one half.
 const POISSON: f64 = 0.4;
@@ -19,6 +22,9 @@ const POISSON: f64 = 0.4;
 const DAMPING: f64 = 0.05;
 /// Radius by which the hulls of its cells are extruded, in the shortest edge of the cells.
 const ROUNDING: f64 = 0.1;
+
+/// Least and largest stretch that a lattice can be told.
+const SCALES: [f64; 2] = [0.1, 10.0];
 
 /// Keys of `kind = "jelly"`: a block that stands on its place.
 #[derive(Clone, Debug, Deserialize)]
@@ -38,6 +44,12 @@ pub struct JellyParameters {
     /// Young's modulus, Pa.
     #[serde(default = "stiffness")]
     pub stiffness: f64,
+    /// Key-frames of what it is at rest.
+    #[serde(default)]
+    pub warp: Vec<WarpKeyFile>,
+    /// After which they begin again, s.
+    #[serde(default)]
+    pub warp_period: f64,
     /// All copies have the same.
     #[serde(skip)]
     lattice: OnceLock<Arc<Lattice>>,
@@ -76,6 +88,7 @@ pub struct Jelly {
     lattice: Arc<Lattice>,
     bodies: [BodyId; 1],
     home: Pose,
+    dance: Option<KeyFrames<{ Warp::NUMBERS }>>,
 }
 
 impl ActorKind for Jelly {
@@ -83,14 +96,20 @@ impl ActorKind for Jelly {
     type Parameters = JellyParameters;
 
     fn check(parameters: &JellyParameters, key: &Key, file: &ArenaFile) -> Result<(), ArenaError> {
-        let JellyParameters { material, size, cells, density, stiffness, .. } = parameters;
+        let JellyParameters { material, size, cells, density, stiffness, warp, warp_period, .. } = parameters;
         file.check_material(&key.at("material"), material)?;
         for axis in 0..3 {
             key.at("size").index(axis).number(size[axis], 0.2, 20.0, "m")?;
             key.at("cells").index(axis).count(cells[axis] as usize, 1, 6, "cells")?;
         }
         key.at("density").number(*density, 1.0, 2e4, "kg/m^3")?;
-        key.at("stiffness").number(*stiffness, 100.0, 1e9, "Pa")
+        key.at("stiffness").number(*stiffness, 100.0, 1e9, "Pa")?;
+        check_warp(key, warp, *warp_period)?;
+        for (i, frame) in warp.iter().enumerate() {
+            let key = key.at("warp").index(i).at("bend").index(1);
+            key.require(frame.bend[1] == 0.0, frame.bend[1], "0: a jelly bends towards its x alone")?;
+        }
+        Ok(())
     }
 
     fn add(site: &mut Site, parameters: &JellyParameters) -> Result<Self, SimError> {
@@ -102,7 +121,8 @@ impl ActorKind for Jelly {
         let points: Vec<_> = surface(parameters).collect();
         let places: Vec<_> = points.iter().filter_map(|&node| lattice.at(node)).collect();
         let skin = PartInfo::skin(site.world, body, &places, Shape::Hull { points, radius: 0.0 });
-        Ok(Self { info: site.info(Self::KIND, vec![skin]), lattice, bodies: [body], home: site.pose })
+        let dance = key_frames(&parameters.warp, parameters.warp_period);
+        Ok(Self { info: site.info(Self::KIND, vec![skin]), lattice, bodies: [body], home: site.pose, dance })
     }
 }
 
@@ -164,6 +184,15 @@ impl Actor for Jelly {
 
     fn bodies(&self) -> &[BodyId] {
         &self.bodies
+    }
+
+    fn step(&mut self, step: &mut Step) -> Result<(), SimError> {
+        let Some(dance) = &self.dance else { return Ok(()) };
+        let warp = Warp::of_numbers(dance.at(step.tick as f64 * step.dt));
+        // Between key-frames the cubic goes past them by a little.
+        let scale = warp.scale.clamp(DVec3::splat(SCALES[0]), DVec3::splat(SCALES[1]));
+        let rest = Warp { scale, bend: warp.bend.with_y(0.0), ..warp }.rest_shape()?;
+        step.world.set_controls(self.bodies[0], &rest.numbers())
     }
 
     fn when_lost(&self) -> WhenLost {

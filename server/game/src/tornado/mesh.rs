@@ -9,6 +9,7 @@ use pita_sim::{BodyId, FigureDesc, JointDrive, SimError, World};
 
 use super::TornadoParameters;
 use super::column::Column;
+use crate::arena_file::key_frames;
 use crate::free_form::{Appearance, AppearanceDof, KeyFrames, Warp};
 
 /// Rings of the funnel's mesh, from foot to top.
@@ -60,10 +61,9 @@ impl Warping {
     /// Adds the DOF of a funnel that is not there yet; `place`, m, is where they are said to be.
     ///
     /// # Errors
-    /// What is wrong with its key-frames, and what the engine says.
+    /// What the engine says.
     pub fn add(world: &mut World, p: &TornadoParameters, place: DVec3) -> Result<Self, SimError> {
-        let keys: Vec<_> = p.warp.iter().map(|frame| frame.key()).collect();
-        let keys = if keys.is_empty() { None } else { Some(KeyFrames::new(keys, Some(p.warp_period))?) };
+        let keys = key_frames(&p.warp, p.warp_period);
         let q = Appearance { strength: 0.0, ..Appearance::PLAIN }.numbers().to_vec();
         let gains = EASE.gains(world.settings().dt)?;
         let (v, dof) = (vec![0.0; q.len()], AppearanceDof::new(place, world.settings().gravity, gains));

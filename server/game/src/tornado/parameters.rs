@@ -3,8 +3,7 @@
 use serde::Deserialize;
 
 use super::life::Lifespan;
-use crate::arena_file::{ArenaError, ArenaFile, Key};
-use crate::free_form::{KEYS_MAX, Warp};
+use crate::arena_file::{ArenaError, ArenaFile, Key, WarpKeyFile, check_warp};
 
 /// Most legs of a path.
 const LEGS_MAX: usize = 256;
@@ -64,7 +63,7 @@ pub struct TornadoParameters {
     /// Its closed path.
     pub legs: Vec<LegFile>,
     /// Key-frames of its mesh, on top of what its motion does to it.
-    pub warp: Vec<WarpFile>,
+    pub warp: Vec<WarpKeyFile>,
     /// After which the key-frames begin again, s.
     pub warp_period: f64,
 }
@@ -87,35 +86,6 @@ pub struct LegFile {
 
 fn critical() -> f64 {
     1.0
-}
-
-/// A key-frame of the mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct WarpFile {
-    /// When, s.
-    pub at: f64,
-    /// Stretch along x, y and z.
-    #[serde(default = "unscaled")]
-    pub scale: [f64; 3],
-    /// Turn about the axis with each metre up, rad/m.
-    #[serde(default)]
-    pub twist: f64,
-    /// Curvature of the axis towards x and z, rad/m.
-    #[serde(default)]
-    pub bend: [f64; 2],
-}
-
-fn unscaled() -> [f64; 3] {
-    [1.0; 3]
-}
-
-impl WarpFile {
-    /// Time and numbers.
-    pub fn key(&self) -> (f64, [f64; Warp::NUMBERS]) {
-        let warp = Warp { scale: self.scale.into(), twist: self.twist, bend: self.bend.into() };
-        (self.at, warp.numbers())
-    }
 }
 
 impl Default for TornadoParameters {
@@ -188,7 +158,7 @@ impl TornadoParameters {
         number("dust_life", self.dust_life, 0.1, 10.0, "s")?;
         key.at("fx_period").count(self.fx_period as usize, 1, 300, "ticks")?;
         self.check_legs(&key.at("legs"), file)?;
-        self.check_warp(key)
+        check_warp(key, &self.warp, self.warp_period)
     }
 
     fn check_legs(&self, key: &Key, file: &ArenaFile) -> Result<(), ArenaError> {
@@ -201,27 +171,5 @@ impl TornadoParameters {
             key.at("wait").number(leg.wait, 0.0, 600.0, "s")?;
         }
         Ok(())
-    }
-
-    fn check_warp(&self, key: &Key) -> Result<(), ArenaError> {
-        let frames = key.at("warp");
-        frames.count(self.warp.len(), 0, KEYS_MAX, "key-frames")?;
-        let mut last = f64::NEG_INFINITY;
-        for (i, frame) in self.warp.iter().enumerate() {
-            let key = frames.index(i);
-            key.at("at").number(frame.at, 0.0, 3_600.0, "s")?;
-            key.at("at").require(frame.at > last, frame.at, "later than the key-frame before")?;
-            last = frame.at;
-            for axis in 0..3 {
-                key.at("scale").index(axis).number(frame.scale[axis], 0.1, 10.0, "")?;
-            }
-            key.at("twist").number(frame.twist, -10.0, 10.0, "rad/m")?;
-            for axis in 0..2 {
-                key.at("bend").index(axis).number(frame.bend[axis], -1.0, 1.0, "rad/m")?;
-            }
-        }
-        let lasts = self.warp.first().map_or(0.0, |first| last - first.at);
-        let longer = self.warp.is_empty() || self.warp_period > lasts && self.warp_period <= 3_600.0;
-        key.at("warp_period").require(longer, self.warp_period, "longer than its key-frames, at most 3600 s")
     }
 }

@@ -1,9 +1,9 @@
 //! Arena files, good and bad.
 
-use pita_game::arena_file::{ArenaFile, PrecisionFile, with_parameters};
+use pita_game::arena_file::{ArenaFile, PrecisionFile, extremes, with_parameters};
 use pita_game::vehicle::VehicleParameters;
 use pita_game::{ActorKinds, Arena, ArenaError, Supplies};
-use pita_sim::{Method, Shape, SolverSettings};
+use pita_sim::{DVec3, Method, QueryFilter, Shape, SolverSettings};
 
 use crate::test_track::{FLAT, SETTINGS};
 
@@ -74,6 +74,23 @@ fn parameters_are_chosen_by_who_runs_the_arena() {
     assert_eq!(refusal(&[("lines", 2)]), "parameters is lines, allowed: one of rows");
     let unknown = ArenaFile::parse(&text.replace("$rows", "$rovs")).err().map(|error| error.to_string());
     assert!(unknown.is_some_and(|error| error.contains("invalid type: string \"$rovs\"")));
+}
+
+#[test]
+fn parameters_are_known_by_their_ends() {
+    let parameter = |name: &str, [default, min, max]: [i64; 3]| {
+        format!("[parameters.{name}]\ndefault = {default}\nmin = {min}\nmax = {max}\n")
+    };
+    let text = format!("{FLAT}\n{}{}", parameter("cars", [6, 0, 128]), parameter("storm", [0, 0, 1]));
+    let chosen = |given: &[(&str, i64)]| given.iter().map(|&(name, value)| (name.to_owned(), value)).collect();
+    let expected: [std::collections::BTreeMap<String, i64>; 4] = [
+        chosen(&[("cars", 0)]),
+        chosen(&[("cars", 128)]),
+        chosen(&[("storm", 1)]),
+        chosen(&[("cars", 128), ("storm", 1)]),
+    ];
+    assert_eq!(extremes(&text).unwrap(), expected);
+    assert!(extremes(FLAT).unwrap().is_empty());
 }
 
 /// Replacement in the flat arena's file, and what the error has to say.
@@ -319,6 +336,43 @@ fn statics_may_be_meshes() {
     assert!(refusal(&with("level/square.obj")).contains("no file of this name comes with the game"));
     let both = with("a.obj").replacen("mesh =", "shape.half_space = {}\nmesh =", 1);
     assert!(refusal(&both).contains("either shape or mesh"), "{}", refusal(&both));
+}
+
+/// Free-form deformation of what never moves: a box is scaled and twisted from its foot up, a mesh is bent to an arc, and both
+/// collide where they are then.
+#[test]
+fn statics_may_be_warped() {
+    let pieces = "[[statics]]\nshape.box.half = [1.0, 1.0, 0.5]\nwarp = { scale = [1, 2, 1], twist = 0.3926990816987241 }\n\
+                  material = \"asphalt\"\nposition = [20.0, 1.0, 40.0]\n\
+                  [[statics]]\nmesh = \"wall.obj\"\nwarp = { bend = [0.25, 0] }\nmaterial = \"asphalt\"\nposition = [40.0, 0.0, 40.0]\n";
+    let wall: String = (0..=8).map(|i| format!("v 0 {0} -2\nv 0 {0} 2\n", i)).collect();
+    let faces: String =
+        (0..8).map(|i| format!("f {} {} {} {}\n", 2 * i + 1, 2 * i + 2, 2 * i + 4, 2 * i + 3)).collect();
+    let wall = wall + &faces;
+    let read = |_: &str| Ok(wall.as_bytes().to_vec());
+    let supplies = Supplies { kinds: &ActorKinds::none(), read: &read };
+    let text = |pieces: &str| FLAT.replacen("[[statics]]", &format!("{pieces}[[statics]]"), 1);
+    let load = |pieces: &str| Arena::from_toml_with(&text(pieces), &SETTINGS, &supplies);
+    let arena = load(pieces).unwrap_or_else(|e| panic!("{e}"));
+    let Shape::Hull { points, .. } = &arena.statics()[0].shape else { panic!("{:?}", arena.statics()[0].shape) };
+    // 4 m high now, and a quarter turn from foot to top.
+    let has = |wanted: DVec3| points.iter().any(|point| point.distance(wanted) < 1e-9);
+    assert!(has(DVec3::new(1.0, -1.0, 0.5)) && has(DVec3::new(0.5, 3.0, -1.0)), "{points:?}");
+    let Shape::Mesh(mesh) = &arena.statics()[1].shape else { panic!("{:?}", arena.statics()[1].shape) };
+    // An arc of 8 m and 4 m of radius.
+    let tip = DVec3::new(4.0 - 4.0 * 2.0f64.cos(), 4.0 * 2.0f64.sin(), 2.0);
+    assert!(mesh.vertices().iter().any(|point| point.distance(tip) < 1e-6), "{:?}", mesh.vertices());
+    let hit = arena.world().ray_cast(DVec3::new(30.0, 3.6, 40.0), DVec3::X, 20.0, &QueryFilter::ALL).unwrap();
+    let at = hit.expect("the wall leans over").point;
+    assert!((at.x - 44.0 + 4.0 * 0.9f64.asin().cos()).abs() < 0.1, "{at}");
+    for (bad, expected) in [
+        (pieces.replace("box.half = [1.0, 1.0, 0.5]", "ball.radius = 1"), "statics[0].warp is of what has no corners"),
+        (pieces.replace("bend = [0.25, 0]", "bend = [0, 2]"), "statics[1].warp.bend[1] is 2, allowed: -1 to 1 rad/m"),
+        (pieces.replace("[1, 2, 1]", "[1, 0, 1]"), "statics[0].warp.scale[1] is 0, allowed: 0.1 to 10"),
+    ] {
+        let error = load(&bad).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains(expected), "{error}, expected: {expected}");
+    }
 }
 
 /// Every copy of a mesh is in the description that clients join with.

@@ -1,7 +1,7 @@
 //! Props: they stand, give way, break, tip, open and wobble.
 
 use pita_game::{Arena, ArenaEvent, Controls};
-use pita_sim::{BodyId, DVec3, PartPoint};
+use pita_sim::{BodyId, DQuat, DVec3, PartPoint};
 
 use crate::test_track::{FLAT, FULL_THROTTLE, SETTINGS, TestTrack};
 
@@ -146,6 +146,48 @@ fn a_jelly_wobbles_and_springs_back() {
     assert!(crate_.y > 1.4, "it carries the crate: {crate_}");
     assert!(world.frame(jelly, PartPoint { part: 0, point: DVec3::Y }).is_some());
     assert_eq!(world.report().quarantined, 0);
+}
+
+/// Key-framed free-form deformation of what has dynamics and collides: it grows, twists and bends in turn, and carries what
+/// stands on it.
+#[test]
+fn a_jelly_dances_to_its_key_frames() {
+    let keys = "position = [30, 0.5, 40]\nsize = [0.8, 2, 0.8]\ncells = [1, 4, 1]\nstiffness = 1e6\nwarp_period = 8\n\
+                warp = [{ at = 0 }, { at = 2, scale = [1, 1.5, 1] }, { at = 4, twist = 0.4 }, { at = 6, bend = [0.3, 0] }]";
+    let load = "[[actors]]\nkind = \"crate\"\nmaterial = \"asphalt\"\nsize = 0.5\nmass = 5\nposition = [30, 2.5, 40]";
+    let mut track = with("jelly", &format!("{keys}\n{load}"));
+    track.arena.audit_energy();
+    let [jelly, load] = ["jelly", "crate"].map(|kind| bodies(&track.arena, kind)[0]);
+    // The middle of its top off that of its foot, and an edge of the top.
+    let top = |track: &TestTrack| {
+        let place = |part, x, y| {
+            let at = PartPoint { part, point: DVec3::new(x, y, 0.0) };
+            DVec3::from(track.arena.world().frame(jelly, at).unwrap().position)
+        };
+        let [left, right] = [-0.4, 0.4].map(|x| place(3, x, 2.0));
+        (0.5 * (left + right) - place(0, 0.0, 0.0), right - left)
+    };
+    // Key-frames, and where the same deformation puts those points.
+    let wanted = [
+        (60, DVec3::Y * 3.0, DVec3::X * 0.8),
+        (120, DVec3::Y * 2.0, DQuat::from_rotation_y(0.8) * DVec3::X * 0.8),
+        (180, DVec3::new(1.0 - 0.6f64.cos(), 0.6f64.sin(), 0.0) / 0.3, DQuat::from_rotation_z(-0.6) * DVec3::X * 0.8),
+        (240, DVec3::Y * 2.0, DVec3::X * 0.8),
+    ];
+    let (mut tick, mut highest) = (0, 0.0f64);
+    for (until, middle, edge) in wanted {
+        while tick < until {
+            track.tick();
+            tick += 1;
+            assert!(!track.arena.world().report().is_energy_burst(), "{:?}", track.arena.world().report());
+            highest = highest.max(track.arena.world().position(load).unwrap().y);
+        }
+        let is = top(&track);
+        assert!(is.0.distance(middle) < 0.08 && is.1.distance(edge) < 0.08, "tick {tick}: {is:?} of {middle}, {edge}");
+    }
+    let end = track.arena.world().position(load).unwrap();
+    assert!(highest > 3.1 && end.distance(DVec3::new(30.0, 2.25, 40.0)) < 0.1, "the crate: {highest} m, {end}");
+    assert_eq!((track.arena.world().report().quarantined, track.arena.logic().lost), (0, 0));
 }
 
 /// Who is not touched costs nothing.
