@@ -124,11 +124,12 @@ fn sheep_flee_a_tornado() {
 }
 
 /// Who fears nothing is run over by a car at full speed, flies no faster than twice that, and gets up. What a car does to
-/// the legs of a sheep differs from centimetre to centimetre, so it stands at ten places. Joints are stiff or have no way to
-/// open but in ticks that end at the cap of iterations: of a rigid sheep they open by more than 5 cm at one place in five.
+/// the legs of a sheep differs from centimetre to centimetre, so it stands at ten places. Joints and rods are stiff or have no way to
+/// open but in ticks that end at the cap of iterations: by more than 5 cm they do of a rigid sheep at one place in five, of
+/// natural coordinates at one in forty.
 #[test]
 fn a_sheep_that_is_run_over_gets_up() {
-    for (form, torn_at_most) in FORMS.into_iter().zip([0, 0, 5]) {
+    for (form, torn_at_most) in FORMS.into_iter().zip([2, 0, 5]) {
         let places = (0..10).map(|i| 10.0 + 0.5 * f64::from(i));
         let outcomes: Vec<_> = places.map(|place| run_over(form, place)).collect();
         let torn = outcomes.iter().filter(|(gap, _)| *gap >= 0.05).count();

@@ -177,7 +177,8 @@ impl ContactTerm {
             Some(speed) => (approach.free + speed) * dt * BOUNCE_STIFFENING,
             None => approach.now * dt - point.gap.max(0.0),
         };
-        let closes = point.gap - approach.free * dt < settings.transition;
+        // By its own motion: what falls freely beside what carries it would count as hitting in every tick.
+        let closes = point.gap - approach.now * dt < settings.transition;
         let most_stiffening = (STIFFEST_LOADED / settings.normal_stiffness).max(1.0);
         let stiffening = point.stiffening.clamp(1.0, most_stiffening);
         let loaded = settings.normal_stiffness * stiffening;
