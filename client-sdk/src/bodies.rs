@@ -149,6 +149,13 @@ impl Bodies {
         self.bodies.retain(|_, known| known.source != Source::Cell(cell));
     }
 
+    /// What only the cell knows another source is to tell of: as of `tick` it is not taken any more.
+    pub fn await_others(&mut self, cell: CellId, tick: u64) {
+        self.newest.remove(&Source::Cell(cell));
+        let of_cell = self.bodies.values_mut().filter(|known| known.source == Source::Cell(cell));
+        of_cell.for_each(|known| known.awaited_since = Some(tick));
+    }
+
     /// All bodies as of `tick`, the present one.
     pub fn gather(&mut self, tick: u64) -> Gathered {
         self.bodies.retain(|_, known| known.awaited_since.is_none_or(|since| tick < since + AWAITED_TICKS));
@@ -249,6 +256,17 @@ mod tests {
     fn take(bodies: &mut Bodies, source: Source, tick: u64, ids: &[u32], departed: &[u32]) {
         let departures = [Departure { to: B, bodies: departed.to_vec() }];
         bodies.take(source, &frame(tick, ids), &departures, |cell| cell == A || cell == B);
+    }
+
+    #[test]
+    fn who_goes_over_to_another_stream_stays_until_that_tells_or_is_silent() {
+        let mut bodies = Bodies::default();
+        take(&mut bodies, Source::Cell(A), 5, &[1, 2], &[]);
+        bodies.await_others(A, 6);
+        assert_eq!(seen(&mut bodies, 8), [(1, 5), (2, 5)]);
+        take(&mut bodies, Source::Cell(CellId::WHOLE), 9, &[1], &[]);
+        assert_eq!(seen(&mut bodies, 9), [(1, 9), (2, 5)]);
+        assert_eq!(seen(&mut bodies, 6 + AWAITED_TICKS), [(1, 9)]);
     }
 
     #[test]

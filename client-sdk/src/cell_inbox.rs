@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use pita_protocol::{
     WireError, decode,
-    dof::{CellDecoder, Frame, GROUPS_MAX},
+    dof::{CellDecoder, Frame, GROUPS_MAX, base_of},
     message::{CellGrant, CellId, CellSnapshot, Departure, Keyframes, KeyframesWanted},
 };
 
@@ -17,6 +17,12 @@ const GROUPS_KEPT_MAX: usize = 2 * 8 * GROUPS_MAX;
 /// A cell puts a keyframe at least every 32 ticks, the session's own snapshots come every tick: after so many of these
 /// without one of those it is silent. Three in a row are rarely lost; less would take losses for silence.
 const SILENT_SNAPSHOTS: u32 = 96;
+
+/// Keyframes that come sooner than this, ticks, come because something happened, and so do snapshots in between.
+const QUIET_TICKS: u64 = 32;
+/// A layer above the first that none of so many keyframes had a snapshot of is silent. Who moves now and then is told of at
+/// three ticks in a row, which a layer's turn is among often enough.
+const SILENT_KEYFRAMES: u32 = 24;
 
 /// A cell to be taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,6 +62,8 @@ pub struct CellInbox {
     /// Tick at which that was said.
     granted_at: u64,
     cells: BTreeMap<CellId, Reading>,
+    /// Cells of which a layer has fallen silent since that was asked.
+    fallen_silent: u64,
 }
 
 #[derive(Debug)]
@@ -63,16 +71,66 @@ struct Reading {
     decoder: CellDecoder,
     /// Whether a keyframe is missing.
     is_lost: bool,
+    /// Tick of the oldest that is, where that is known. Newer ones may be there: not each is coded against the one before.
+    missing: Option<u64>,
     /// Own snapshots of the session since a keyframe was put.
     unheard: u32,
     /// How often that were too many.
     silences: u32,
+    heard: Heard,
+}
+
+/// Which layers of a cell are heard of.
+#[derive(Clone, Copy, Debug, Default)]
+struct Heard {
+    /// How many of them are taken.
+    layers: u8,
+    /// Tick of the newest keyframe.
+    keyframe: u64,
+    /// Keyframes that came because something happened.
+    keyframes: u32,
+    /// Of each layer above the first, whether there was a snapshot of it: by the trailing zeros of its age, which are as many
+    /// for all of one layer.
+    ages: u64,
+}
+
+impl Heard {
+    /// From now on so many layers are taken.
+    fn take(&mut self, layers: u8) {
+        if self.layers != layers {
+            *self = Self { layers, keyframe: self.keyframe, ..Self::default() };
+        }
+    }
+
+    /// A snapshot of `tick` came. Answers whether it shows that a layer is silent.
+    fn note(&mut self, tick: u64, keyframe_age: u8) -> bool {
+        if keyframe_age > 0 {
+            self.ages |= 1 << keyframe_age.trailing_zeros();
+            return false;
+        }
+        let gap = tick.saturating_sub(self.keyframe);
+        self.keyframe = self.keyframe.max(tick);
+        self.keyframes += u32::from((1..QUIET_TICKS).contains(&gap));
+        if self.keyframes < SILENT_KEYFRAMES {
+            return false;
+        }
+        let is_silent = self.ages.count_ones() + 1 < self.layers.into();
+        (self.keyframes, self.ages) = (0, 0);
+        is_silent
+    }
 }
 
 impl Default for Reading {
     /// Nothing is known of it.
     fn default() -> Self {
-        Self { decoder: CellDecoder::default(), is_lost: true, unheard: 0, silences: 0 }
+        Self {
+            decoder: CellDecoder::default(),
+            is_lost: true,
+            missing: None,
+            unheard: 0,
+            silences: 0,
+            heard: Heard::default(),
+        }
     }
 }
 
@@ -104,22 +162,25 @@ impl CellInbox {
     }
 
     /// The cells to be taken, in order, of which as many layers as `allowed` makes of those that are granted.
-    pub fn wishes(&self, allowed: impl Fn(u8) -> u8) -> Vec<Wish> {
-        let silences = |cell: &CellId| self.cells.get(cell).map_or(0, |reading| reading.silences);
-        let wish =
-            |&CellGrant { cell, layers }: &CellGrant| Wish { cell, layers: allowed(layers), silences: silences(&cell) };
-        self.granted.iter().map(wish).collect()
+    pub fn wishes(&mut self, allowed: impl Fn(u8) -> u8) -> Vec<Wish> {
+        let Self { granted, cells, .. } = self;
+        let wish = |&CellGrant { cell, layers }: &CellGrant| {
+            let (reading, layers) = (cells.entry(cell).or_default(), allowed(layers));
+            reading.heard.take(layers);
+            Wish { cell, layers, silences: reading.silences }
+        };
+        granted.iter().map(wish).collect()
     }
 
-    /// A snapshot of the session's own arrived. Answers how many cells have fallen silent with it: nothing else notices a
-    /// subscription that came to nothing somewhere on the way, and the cell would be a hole for ever.
+    /// A snapshot of the session's own arrived. Answers how many cells, or layers of cells, have fallen silent since the last
+    /// one: nothing else notices a subscription that came to nothing somewhere on the way, and the cell would be a hole, or
+    /// told of at a fraction of its rate, for ever.
     pub fn note_own_snapshot(&mut self) -> u64 {
-        let mut fallen_silent = 0;
+        let mut fallen_silent = std::mem::take(&mut self.fallen_silent);
         for reading in self.cells.values_mut() {
             reading.unheard += 1;
             if reading.unheard >= SILENT_SNAPSHOTS {
-                (reading.unheard, reading.is_lost) = (0, true);
-                reading.silences = reading.silences.wrapping_add(1);
+                reading.fall_silent();
                 fallen_silent += 1;
             }
         }
@@ -141,7 +202,10 @@ impl CellInbox {
         let lost = self.cells.iter().filter(|(_, reading)| reading.is_lost);
         let wanted = |(&cell, reading): (&CellId, &Reading)| KeyframesWanted {
             cell,
-            have: reading.decoder.keyframe().unwrap_or(0),
+            have: reading
+                .missing
+                .map_or(reading.decoder.keyframe(), |of| reading.decoder.keyframe_before(of))
+                .unwrap_or(0),
         };
         lost.map(wanted).collect()
     }
@@ -157,10 +221,13 @@ impl CellInbox {
         if keyframe_age == 0 {
             reading.unheard = 0;
         }
+        if reading.heard.note(tick, keyframe_age) {
+            reading.fall_silent();
+            self.fallen_silent += 1;
+        }
         match reading.decode(tick, &dof, keyframe_age == 0) {
             Ok(frame) => {
-                // Snapshots to come will be coded against it.
-                reading.is_lost = !reading.decoder.has(tick.saturating_sub(keyframe_age.into()));
+                reading.need(tick.saturating_sub(keyframe_age.into()));
                 self.check_room(cell)?;
                 Ok(Taken::Frame(cell, frame, departures))
             }
@@ -178,11 +245,19 @@ impl CellInbox {
         for of_cell in &answer.cells {
             let Some(reading) = self.cells.get_mut(&of_cell.cell) else { continue };
             // Where there is nothing, or nothing newer, the stream itself says the rest.
-            reading.is_lost = false;
+            (reading.is_lost, reading.missing) = (false, None);
             let mut newest = None;
             for keyframe in &of_cell.keyframes {
                 check_tick(keyframe.tick, latest)?;
-                newest = Some(reading.decode(keyframe.tick, &keyframe.dof, true)?);
+                match reading.decode(keyframe.tick, &keyframe.dof, true) {
+                    Ok(frame) => newest = Some(frame),
+                    // What it was asked for with is forgotten meanwhile: all of them, then.
+                    Err(WireError::NoBaseline) => {
+                        (reading.decoder, reading.missing) = (CellDecoder::default(), None);
+                        break;
+                    }
+                    Err(error) => return Err(error),
+                }
                 fetched.keyframes += 1;
             }
             fetched.frames.extend(newest.map(|frame| (of_cell.cell, frame)));
@@ -211,13 +286,35 @@ fn check_tick(tick: u64, latest: u64) -> Result<(), WireError> {
 }
 
 impl Reading {
+    /// It is to be subscribed to anew, and what was missed asked for.
+    fn fall_silent(&mut self) {
+        (self.unheard, self.is_lost) = (0, true);
+        self.silences = self.silences.wrapping_add(1);
+    }
+
     fn decode(&mut self, tick: u64, dof: &[u8], is_keyframe: bool) -> Result<Arc<Frame>, WireError> {
         let decoded = self.decoder.decode(tick, dof, is_keyframe);
         self.is_lost |= decoded.is_err();
-        if decoded == Err(WireError::Desync) {
-            self.decoder = CellDecoder::default();
+        match &decoded {
+            Err(WireError::Desync) => (self.decoder, self.missing) = (CellDecoder::default(), None),
+            Err(WireError::NoBaseline) => base_of(tick, dof).into_iter().for_each(|base| self.miss(base)),
+            _ => {}
         }
         decoded
+    }
+
+    /// Snapshots to come will need the keyframe of `tick`.
+    fn need(&mut self, tick: u64) {
+        if !self.decoder.has(tick) {
+            self.miss(tick);
+        }
+        self.missing.take_if(|missing| self.decoder.has(*missing));
+        self.is_lost = self.missing.is_some();
+    }
+
+    /// The keyframe of `tick` is not there.
+    fn miss(&mut self, tick: u64) {
+        (self.is_lost, self.missing) = (true, Some(self.missing.map_or(tick, |missing| missing.min(tick))));
     }
 }
 
@@ -255,7 +352,7 @@ mod tests {
     fn a_cell_without_a_keyframe_is_silent_and_one_at_rest_is_not() {
         let (mut encoder, mut inbox) = (CellEncoder::new(Cadence::default()), CellInbox::default());
         inbox.grant(1, granted(&[CELL]));
-        let silences = |inbox: &CellInbox| inbox.wishes(|layers| layers)[0].silences;
+        let silences = |inbox: &mut CellInbox| inbox.wishes(|layers| layers)[0].silences;
         for tick in 1..=400 {
             if let Some(due) = encoder.due(tick, &state(1.0)) {
                 let coded = encoder.encode(tick, &state(1.0), due, &[]);
@@ -263,13 +360,43 @@ mod tests {
                 let message = CellSnapshot { cell: CELL, tick, keyframe_age, departures, dof: coded.dof };
                 inbox.take(&encode(&message), 999).unwrap();
             }
-            assert_eq!((inbox.note_own_snapshot(), silences(&inbox)), (0, 0));
+            assert_eq!((inbox.note_own_snapshot(), silences(&mut inbox)), (0, 0));
         }
         assert!(inbox.wanted().is_empty());
         let fallen: Vec<u64> = (0..SILENT_SNAPSHOTS).map(|_| inbox.note_own_snapshot()).collect();
         assert_eq!(fallen.iter().sum::<u64>(), 1);
         // It is to be subscribed to anew, once, and what was missed asked for.
-        assert_eq!((silences(&inbox), inbox.wanted().len(), inbox.note_own_snapshot()), (1, 1, 0));
+        assert_eq!((silences(&mut inbox), inbox.wanted().len(), inbox.note_own_snapshot()), (1, 1, 0));
+    }
+
+    /// Of four layers each is cut off in turn, in a cell where somebody moves all the time, and in one where somebody does now
+    /// and then.
+    #[test]
+    fn a_layer_that_is_silent_is_noticed_and_one_with_nothing_to_tell_is_not() {
+        for (every, cut) in
+            [(1, None), (1, Some(1)), (1, Some(2)), (1, Some(3)), (13, None), (13, Some(1)), (13, Some(3))]
+        {
+            let (mut encoder, mut inbox) = (CellEncoder::new(Cadence::default()), CellInbox::default());
+            inbox.grant(1, granted(&[CELL]));
+            assert_eq!(inbox.wishes(|layers| layers)[0].silences, 0);
+            let mut fallen = 0;
+            for tick in 1..=800u64 {
+                let state = state((tick - tick % every) as f64);
+                let Some(due) = encoder.due(tick, &state) else { continue };
+                let coded = encoder.encode(tick, &state, due, &[]);
+                if Some(coded.layer) != cut {
+                    let (departures, keyframe_age) = (Vec::new(), coded.keyframe_age);
+                    let message = CellSnapshot { cell: CELL, tick, keyframe_age, departures, dof: coded.dof };
+                    inbox.take(&encode(&message), 999).unwrap();
+                }
+                fallen += inbox.note_own_snapshot();
+            }
+            let silences = inbox.wishes(|layers| layers)[0].silences;
+            assert_eq!((fallen > 0, silences > 0), (cut.is_some(), cut.is_some()), "{every} {cut:?}: {fallen}");
+            // Who takes fewer layers hears of fewer.
+            inbox.wishes(|_| 1);
+            assert_eq!(inbox.cells[&CELL].heard.layers, 1);
+        }
     }
 
     #[test]
@@ -301,6 +428,34 @@ mod tests {
         assert!(matches!(inbox.take(&next(&mut encoder, 31), 99), Ok(Taken::Frame(..))));
         assert_eq!(inbox.grant(32, Vec::new()), Some(vec![CELL]));
         assert!(matches!(inbox.take(&next(&mut encoder, 32), 99), Ok(Taken::Foreign)));
+    }
+
+    /// Keyframes every second tick that are used from the fourth on: two chains side by side, of which one goes on where the
+    /// other is cut.
+    #[test]
+    fn a_keyframe_is_asked_for_though_newer_ones_are_there() {
+        let cadence = Cadence { keyframe_ticks_log2: 1, settled_ticks: 4, ..Cadence::default() };
+        let (mut encoder, mut inbox) = (CellEncoder::new(cadence), CellInbox::default());
+        inbox.grant(1, granted(&[CELL]));
+        let (mut asked, mut unreadable, mut answer_at) = (0, 0, u64::MAX);
+        for tick in 1..=200 {
+            let message = next(&mut encoder, tick);
+            if tick == answer_at {
+                let mut answer = Keyframes::default();
+                inbox.wanted().iter().for_each(|&wanted| answer.push(wanted, encoder.epoch()));
+                inbox.take_keyframes(&answer, 999).unwrap();
+                answer_at = u64::MAX;
+            }
+            // Every seventh keyframe is lost, and now and then what tells of it, too.
+            if tick % 14 != 1 && tick % 28 != 2 {
+                unreadable += usize::from(matches!(inbox.take(&message, 999), Ok(Taken::Unreadable)));
+            }
+            if !inbox.wanted().is_empty() && answer_at == u64::MAX {
+                (asked, answer_at) = (asked + 1, tick + 4);
+            }
+        }
+        assert!((10..20).contains(&asked) && unreadable < 40, "{asked} questions, {unreadable} not to be read");
+        assert!(inbox.take(&next(&mut encoder, 201), 999).is_ok());
     }
 
     #[test]

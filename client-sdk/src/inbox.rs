@@ -11,7 +11,7 @@ use std::{
 use pita_protocol::{
     WireError, decode,
     dof::Decoder,
-    message::{FATES_MAX, InputAck, InputFate, JoinAccepted, Keyframes, KeyframesWanted, Snapshot},
+    message::{CellId, FATES_MAX, InputAck, InputFate, JoinAccepted, Keyframes, KeyframesWanted, Snapshot},
 };
 
 use crate::{
@@ -120,8 +120,12 @@ impl Inbox {
         self.note_lateness(&head, arrival, now);
         self.follow_clock(&head, now);
         if let Some(granted) = head.cells.take() {
-            let lost = self.cells.grant(head.tick, granted);
-            lost.into_iter().flatten().for_each(|cell| self.bodies.forget(cell));
+            let lost = self.cells.grant(head.tick, granted).unwrap_or_default();
+            // Everything goes on in one stream, or in cells: nobody is to flicker meanwhile.
+            let goes_over = lost.contains(&CellId::WHOLE) || self.cells.is_taken(CellId::WHOLE);
+            for cell in lost {
+                if goes_over { self.bodies.await_others(cell, head.tick) } else { self.bodies.forget(cell) }
+            }
         }
         self.statistics.cells_fallen_silent += self.cells.note_own_snapshot();
         let layers = self.cells.granted().iter().map(|grant| grant.layers).max().unwrap_or(0);
@@ -176,7 +180,7 @@ impl Inbox {
     }
 
     /// The cells that the session takes, as granted and as far as the line allows, and the keyframes that it lacks of them.
-    pub fn cells_to_do(&self) -> (Vec<Wish>, Vec<KeyframesWanted>) {
+    pub fn cells_to_do(&mut self) -> (Vec<Wish>, Vec<KeyframesWanted>) {
         (self.cells.wishes(|granted| self.line.layers(granted)), self.cells.wanted())
     }
 

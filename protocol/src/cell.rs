@@ -28,6 +28,8 @@ pub struct CellId {
 impl CellId {
     /// The cell of what has no place: kinds of a game's own, whose numbers may mean anything.
     pub const EVERYWHERE: Self = Self { x: i16::MIN, z: i16::MIN };
+    /// Not a cell but everything there is, in one stream: for whom all cells would fit into its budget.
+    pub const WHOLE: Self = Self { x: i16::MIN, z: i16::MAX };
 }
 
 /// A cell that a session may take within its byte budget.

@@ -177,7 +177,7 @@ impl CellSettings {
         let epoch_keyframes = self.epoch_keyframes.get() as usize;
         crate::cells::Settings {
             side_m: self.side_m.get() as f32,
-            cadence: Cadence { keyframe_ticks_log2: self.keyframe_ticks.log2(), epoch_keyframes },
+            cadence: Cadence { keyframe_ticks_log2: self.keyframe_ticks.log2(), epoch_keyframes, ..Cadence::default() },
             bytes_per_s: self.bytes_per_s.get(),
             tick_hz,
         }

@@ -23,16 +23,10 @@ use crate::cell::Keyframe;
 
 /// Ticks from one keyframe to the next where nothing happens.
 const QUIET_TICKS: u64 = 32;
-/// An epoch ends where its keyframes have come to so many times the bytes of its first: then to begin anew costs a share
-/// of the stream, and to catch up not many times more than the state itself.
-const EPOCH_GROWTH: usize = 4;
-/// And where they have come to so many bytes: an answer to who catches up is a message, too.
+/// An epoch ends where its keyframes have come to so many bytes: an answer to who catches up is a message, too.
 const EPOCH_BYTES_MAX: usize = 2 << 20;
 /// Groups of new bodies that wait for the next keyframe: until then each snapshot says all of them anew.
 const FRESH_GROUPS_MAX: usize = 64;
-/// Ticks from a keyframe to the first snapshot that is coded against it: who lost it learns of it a tick later, and has it
-/// a round trip of 100 ms after that.
-const SETTLED_TICKS: u64 = 5;
 /// For so many ticks it is said that there is no more news: once for those who lost the last, and once for those who did
 /// not, to whom two equal states say that the motion between the two before has ended.
 const STILL_TICKS: u64 = 2;
@@ -48,11 +42,17 @@ pub struct Cadence {
     pub keyframe_ticks_log2: u8,
     /// Keyframes of an epoch at most, 1 to 100. More of them makes catching up longer.
     pub epoch_keyframes: usize,
+    /// Ticks from a keyframe to the first snapshot that is coded against it, 1 to 8. Who lost it learns of it a tick later,
+    /// and has it a round trip after that.
+    pub settled_ticks: u8,
+    /// An epoch ends where its keyframes have come to so many times the bytes of its first: then to begin anew costs a share
+    /// of the stream, and to catch up not many times more than the state itself.
+    pub epoch_growth: u8,
 }
 
 impl Default for Cadence {
     fn default() -> Self {
-        Self { keyframe_ticks_log2: 3, epoch_keyframes: 50 }
+        Self { keyframe_ticks_log2: 3, epoch_keyframes: 50, settled_ticks: 5, epoch_growth: 4 }
     }
 }
 
@@ -195,7 +195,12 @@ impl CellEncoder {
 
     /// From now on snapshots are coded against the newest keyframe that is old enough.
     fn settle(&mut self, tick: u64) {
-        let settled = self.epoch.iter().rev().map(|keyframe| keyframe.tick).find(|of| tick - of >= SETTLED_TICKS);
+        let settled = self
+            .epoch
+            .iter()
+            .rev()
+            .map(|keyframe| keyframe.tick)
+            .find(|of| tick - of >= self.cadence.settled_ticks.into());
         if let Some(keyframe) = settled {
             self.take_over();
             self.encoder.acknowledge(keyframe, 0);
@@ -228,7 +233,7 @@ impl CellEncoder {
         let Some(first) = self.epoch.first() else { return true };
         let bytes: usize = self.epoch.iter().map(|keyframe| keyframe.dof.len()).sum();
         self.epoch.len() >= self.cadence.epoch_keyframes.clamp(1, 100)
-            || bytes > first.dof.len() * (1 + EPOCH_GROWTH)
+            || bytes > first.dof.len() * (1 + usize::from(self.cadence.epoch_growth))
             || bytes > EPOCH_BYTES_MAX
     }
 }
@@ -270,9 +275,14 @@ impl CellDecoder {
         self.decoder.group_count()
     }
 
-    /// Whether it has the keyframe of `tick`, or a newer one.
+    /// Whether it has the keyframe of `tick`, or one that old is of no use any more.
     pub fn has(&self, tick: u64) -> bool {
-        self.keyframe().is_some_and(|newest| newest >= tick)
+        self.keyframes.first().is_some_and(|oldest| tick < *oldest) || self.keyframes.binary_search(&tick).is_ok()
+    }
+
+    /// Tick of the newest keyframe before `tick`.
+    pub fn keyframe_before(&self, tick: u64) -> Option<u64> {
+        self.keyframes.iter().rev().copied().find(|of| *of < tick)
     }
 
     /// Tick of the newest keyframe.

@@ -39,7 +39,7 @@ pub use predict::GroupState;
 pub use priority::{Priorities, Relevance};
 pub use quantise::{Group, Precision, Quantised, STEPS_MAX, absolute, relative, rotate};
 pub use slice::Slice;
-pub use stream::{Decoder, Encoder, HISTORY};
+pub use stream::{Decoder, Encoder, HISTORY, base_of};
 
 /// What the numbers of a body mean.
 pub mod kind {

@@ -34,6 +34,14 @@ pub const SNAPSHOT_MAX: usize = 1 << 20;
 const HAS_BASE: u8 = 1;
 const PARTIAL: u8 = 4;
 
+/// Tick of what the snapshot of `tick` is coded against; `None` where it needs nothing, or is no snapshot.
+pub fn base_of(tick: u64, bytes: &[u8]) -> Option<u64> {
+    match bytes {
+        [flags, age, ..] if flags & HAS_BASE != 0 => tick.checked_sub((*age).into()),
+        _ => None,
+    }
+}
+
 /// Writes a stream for one receiver, or one cell.
 #[derive(Debug, Default)]
 pub struct Encoder {

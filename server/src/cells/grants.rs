@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use pita_protocol::message::{CellGrant, CellId, GRANTS_MAX};
 
-use super::{Division, Offer, Published};
+use super::{Division, Offer, Published, whole};
 
 /// What a connection is never given less than, bytes/s: the own actor, and the nearest cell now and then.
 pub const LEAST_BYTES_PER_S: u32 = 8_000;
@@ -103,8 +103,14 @@ impl Grants {
         if self.since.is_some() && !tick.is_multiple_of(CHOICE_TICKS) {
             return;
         }
-        let taken = self.take(offers, layers, from, division);
-        let granted = with_neighbours(&taken, offers);
+        let (whole, cells) = match offers.iter().position(|offer| offer.cell == CellId::WHOLE) {
+            Some(at) => (Some(&offers[at]), [&offers[..at], &offers[at + 1..]].concat()),
+            None => (None, offers.to_vec()),
+        };
+        let granted = match whole.map_or(0, |whole| self.afford(whole)) {
+            layers @ 1.. => vec![CellGrant { cell: CellId::WHOLE, layers }],
+            0 => with_neighbours(&self.take(&cells, layers, from, division), &cells),
+        };
         if self.since.is_none() || granted != self.granted {
             self.granted = granted;
             self.since = Some(tick);
@@ -119,6 +125,23 @@ impl Grants {
 
     fn layers(&self, cell: CellId) -> u8 {
         self.granted.binary_search_by_key(&cell, |grant| grant.cell).map_or(0, |at| self.granted[at].layers)
+    }
+
+    /// How many layers of everything in one stream fit into the budget; pays for it where it is new, which it is only to a
+    /// connection that keeps up, and as a whole.
+    fn afford(&mut self, whole: &Offer) -> u8 {
+        let (had, most) = (self.layers(CellId::WHOLE), self.bytes_per_tick * self.share - self.own);
+        if had == 0 {
+            let fits = whole.rates.iter().sum::<f64>() <= most * FILLED_BY_NEW;
+            let is_paid = fits && self.share >= 1.0 && self.saved > 0.0;
+            self.saved -= if is_paid { whole.catch_up as f64 } else { 0.0 };
+            return if is_paid { whole::CADENCE.layers() } else { 0 };
+        }
+        let sums = whole.rates.iter().scan(0.0, |sum, rate| {
+            *sum += rate;
+            Some(*sum)
+        });
+        sums.take(whole::CADENCE.layers().into()).filter(|sum| *sum <= most).count() as u8
     }
 
     /// Layers of occupied cells, as far as the budget goes.

@@ -8,6 +8,7 @@ mod grants;
 mod own_stream;
 mod selection;
 mod stream;
+mod whole;
 
 use std::collections::BTreeMap;
 
@@ -21,6 +22,7 @@ pub use grants::LEAST_BYTES_PER_S;
 pub use own_stream::{Head, OwnStream};
 pub use stream::Published;
 use stream::Stream;
+use whole::Whole;
 
 /// Most cells, 50 kB each and more; whoever is outside them is in the cell of what has no place, which all take.
 const CELLS_MAX: usize = 1024;
@@ -58,6 +60,7 @@ pub struct Cells {
     published: Vec<Published>,
     offers: Vec<Offer>,
     over: Vec<CellId>,
+    whole: Whole,
 }
 
 impl Cells {
@@ -70,14 +73,23 @@ impl Cells {
             published: Vec::new(),
             offers: Vec::new(),
             over: Vec::new(),
+            whole: Whole::default(),
         }
     }
 
     /// Divides the world of `tick` and codes it, cell by cell.
     pub fn tick(&mut self, tick: u64, world: &State, crowd: &Crowd) {
-        let Self { settings, division, streams, published, offers, over } = self;
+        let Self { settings, division, streams, published, offers, over, whole } = self;
         let (families, of_bodies) = (crowd.families(), crowd.of_bodies());
-        streams.values_mut().for_each(Stream::clear);
+        let expected = whole.decide(streams, f64::from(settings.bytes_per_s) / f64::from(settings.tick_hz));
+        let had = streams.remove(&CellId::WHOLE);
+        over.clear();
+        over.extend(had.as_ref().filter(|_| expected.is_none()).map(|_| CellId::WHOLE));
+        let mut all = expected.map(|expected| {
+            let settings = Settings { cadence: whole::CADENCE, ..*settings };
+            had.unwrap_or_else(|| Stream::new(CellId::WHOLE, &settings, *world.precision()).expected(expected))
+        });
+        streams.values_mut().chain(&mut all).for_each(Stream::clear);
         // In order of family.
         let mut moved: Vec<(usize, CellId, Vec<u32>)> = Vec::new();
         division.follow(families, |family, from| moved.push((family, from, Vec::new())));
@@ -91,15 +103,18 @@ impl Cells {
             }
             let stream = streams.entry(cell).or_insert_with(|| Stream::new(cell, settings, *world.precision()));
             stream.add(world, body, &families[family as usize]);
+            if let Some(all) = &mut all {
+                all.add(world, body, &families[family as usize]);
+            }
         }
         for (family, from, bodies) in moved {
             if let Some(stream) = streams.get_mut(&from) {
                 stream.left(tick, division.cell_of(family), bodies);
             }
         }
+        streams.extend(all.map(|all| (CellId::WHOLE, all)));
         published.clear();
         published.extend(streams.values_mut().filter_map(|stream| stream.publish(tick)));
-        over.clear();
         over.extend(streams.extract_if(.., |_, stream| stream.is_over(tick)).map(|(cell, _)| cell));
         offers.clear();
         let offer =
@@ -117,7 +132,7 @@ impl Cells {
         &self.over
     }
 
-    /// What there is to be taken, in order of cell.
+    /// What there is to be taken, in order of cell: [`CellId::WHOLE`] and nothing else is everything.
     fn offers(&self) -> &[Offer] {
         &self.offers
     }
@@ -144,6 +159,7 @@ impl Cells {
         self.streams.clear();
         self.published.clear();
         self.offers.clear();
+        self.whole = Whole::default();
     }
 }
 

@@ -60,6 +60,12 @@ impl Stream {
         }
     }
 
+    /// The same, of which it is known what it is likely to take, bytes a tick.
+    pub fn expected(mut self, rate: f64) -> Self {
+        self.rates[0] = rate;
+        self
+    }
+
     /// A tick begins: nobody is in it yet.
     pub fn clear(&mut self) {
         self.state.clear();

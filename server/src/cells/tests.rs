@@ -210,7 +210,7 @@ fn a_body_belongs_to_one_cell_and_the_one_that_it_left_says_where_it_went() {
     for tick in 1..=300u64 {
         field.at(tick);
         cells.tick(tick, &field.state, &field.crowd);
-        for published in cells.published() {
+        for published in cells.published().iter().filter(|published| published.cell != CellId::WHOLE) {
             let message: CellSnapshot = pita_protocol::decode(&published.bytes).unwrap();
             let (decoder, has) = decoders.entry(message.cell).or_default();
             let frame = decoder.decode(tick, &message.dof, message.keyframe_age == 0).unwrap();
@@ -279,4 +279,33 @@ fn a_world_that_is_scattered_far_and_wide_makes_no_more_cells_than_are_bounded()
     }
     assert!(cells.streams.len() <= CELLS_MAX + 1, "{} cells", cells.streams.len());
     assert_eq!(seen.len(), 3002, "everybody is somewhere");
+}
+
+/// Everything fits: soon it comes in one stream, for less. Where there is more than a cell may take it goes on in cells.
+#[test]
+fn who_can_have_everything_takes_it_in_one_stream_and_others_do_not() {
+    let whole = |session: &Session| session.cells.keys().eq(&[CellId::WHOLE]);
+    let mut field = Field::new(2000, 5);
+    let (mut cells, mut rich, mut poor) = (Cells::new(settings()), Session::new(64_000), Session::new(8_000));
+    let mut of_cells = 0.0;
+    for tick in 1..=400 {
+        if tick == 300 {
+            field.moving_one_of = 1;
+        }
+        field.at(tick);
+        cells.tick(tick, &field.state, &field.crowd);
+        rich.take(tick, &field, &cells);
+        poor.take(tick, &field, &cells);
+        assert!(!whole(&poor), "tick {tick}");
+        match tick {
+            30 => of_cells = rich.bytes_per_s(20),
+            31..40 | 300..400 => {}
+            400 => assert!(!whole(&rich)),
+            _ => assert_eq!(whole(&rich), tick >= 40, "tick {tick}"),
+        }
+    }
+    let in_one = rich.bytes[200..300].iter().sum::<usize>() as f64 * 0.3;
+    assert!(in_one < 0.9 * of_cells, "{in_one} and {of_cells} bytes/s");
+    let oldest = rich.known.values().min();
+    assert!(rich.known.len() == 2002 && oldest > Some(&340), "{oldest:?}");
 }

@@ -137,7 +137,7 @@ fn a_crowd_that_appears_at_once_is_a_keyframe() {
 fn every_cadence_can_be_followed() {
     for keyframe_ticks_log2 in 0..=5 {
         let mut toys = Toys::new(77, 20);
-        let cadence = Cadence { keyframe_ticks_log2, epoch_keyframes: 12 };
+        let cadence = Cadence { keyframe_ticks_log2, epoch_keyframes: 12, ..Cadence::default() };
         let mut encoder = CellEncoder::new(cadence);
         let mut watcher = Watcher::new(cadence.layers(), 0);
         for tick in 1..300 {
