@@ -148,7 +148,7 @@ impl<const D: usize> Descent<D> {
             report.linear_iterations += method.direction(at, step);
             report.iterations += 1;
             let walked = self.follow_friction(method, problem, &mut work, &mut report);
-            let walked = walked.or_else(|| self.walk(method, problem, &mut work, report.standing()));
+            let walked = walked.or_else(|| self.walk(method, problem, &mut work, report.standing(), goal));
             work.iteration_took(work.multiply_adds() - before);
             match walked {
                 Some(merit) => report.merit = merit,
@@ -248,6 +248,7 @@ impl<const D: usize> Descent<D> {
         problem: &mut Problem,
         work: &mut Work,
         standing: Standing,
+        goal: Goal,
     ) -> Option<f64> {
         let slope = inner(&self.residual, &self.step);
         let descends = slope < 0.0;
@@ -258,7 +259,7 @@ impl<const D: usize> Descent<D> {
         work.told_potentials();
         self.start.clone_from(&self.u);
         let merit = if method.walk() == Walk::NEWTON {
-            self.walk_as_model_says(problem, work, standing, slope)
+            self.walk_as_model_says(problem, work, standing, slope, goal)
         } else {
             self.search(method, problem, work, slope);
             self.relinearise(problem, work)
@@ -272,12 +273,20 @@ impl<const D: usize> Descent<D> {
         moved.then_some(merit)
     }
 
-    /// Takes the full step, and shortens it where that went too far, unless the watchdog wants to see where it leads.
-    fn walk_as_model_says(&mut self, problem: &mut Problem, work: &mut Work, standing: Standing, slope: f64) -> f64 {
+    /// Takes the full step, and shortens it where that went too far and not to the goal, unless the watchdog wants to see
+    /// where it leads.
+    fn walk_as_model_says(
+        &mut self,
+        problem: &mut Problem,
+        work: &mut Work,
+        standing: Standing,
+        slope: f64,
+        goal: Goal,
+    ) -> f64 {
         self.go(1.0, problem, work);
         let merit = self.relinearise(problem, work);
         let end = inner(&self.residual, &self.step);
-        if Walk::NEWTON.ends_at(slope, end) {
+        if Walk::NEWTON.ends_at(slope, end) || problem.residual_speed(&self.residual) <= goal.residual {
             return merit;
         }
         if self.watchdog.is_bold() && end.is_finite() {
