@@ -43,11 +43,16 @@ impl Integrator {
         resting.resize(islands.len(), Some(Rest::default()));
         touching.clear();
         touching.resize(active.len(), 0);
+        for body in acting.driven() {
+            touching[body as usize] = HELD;
+            resting[islands.island_of(body) as usize] = None;
+        }
         for on in &acting.touching {
             let points = &scene.contacts[on.points.0 as usize..on.points.1 as usize];
             let mut island = Islands::FREE;
             for body in on.spots.into_iter().filter_map(Spot::body) {
-                touching[body as usize] += points.len() as u32;
+                let count = &mut touching[body as usize];
+                *count = count.saturating_add(points.len() as u32);
                 island = islands.island_of(body);
             }
             let Some(Some(rest)) = resting.get_mut(island as usize) else { continue };
@@ -57,13 +62,9 @@ impl Integrator {
                 resting[island as usize] = None;
             }
         }
-        for body in acting.driven() {
-            touching[body as usize] = HELD;
-            resting[islands.island_of(body) as usize] = None;
-        }
         for ((index, active), &touching) in (0..).zip(active.iter()).zip(touching.iter()) {
+            let Some(rest @ Some(_)) = resting.get_mut(islands.island_of(index) as usize) else { continue };
             let body = &scene.bodies[active.id];
-            let Some(rest) = resting.get_mut(islands.island_of(index) as usize) else { continue };
             if body.touching != touching || !body.is_balanced(scene.state, scene.settings) {
                 *rest = None;
             }

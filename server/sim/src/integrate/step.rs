@@ -308,13 +308,11 @@ impl Solve {
             for (&source, outcome) in pair.iter().zip(&mut outcomes) {
                 let Outcome { normal_force, depth, is_still, anchor, stiffening, blow } = outcome;
                 let contact = &mut contacts[source as usize];
-                let before = contact.memory();
-                contact.anchor = finite_or_zero(anchor);
-                contact.blow = blow;
+                let anchor = finite_or_zero(anchor);
                 let normal_force = if normal_force.is_finite() { normal_force } else { 0.0 };
-                contact.load = normal_force.min(if is_solved { contact.normal_force } else { contact.load });
-                contact.normal_force = normal_force;
-                contact.is_settled = is_still && contact.memory() == before;
+                let load = normal_force.min(if is_solved { contact.normal_force } else { contact.load });
+                contact.is_settled = is_still && contact.memory() == (anchor, normal_force, load, blow);
+                (contact.anchor, contact.normal_force, contact.load, contact.blow) = (anchor, normal_force, load, blow);
                 stiffest = if stiffening.is_finite() { stiffest.max(stiffening) } else { stiffest };
                 report.worst_penetration = report.worst_penetration.max(depth);
             }
