@@ -81,6 +81,8 @@ pub enum Response {
     Collide,
     /// They pass through each other in this tick.
     Pass,
+    /// They push each other apart, but for a kerb that the body rolls over within this tick: that it passes.
+    RollOver,
 }
 
 /// What becomes of an actor that left the arena's bounds or that the engine took out of the world.

@@ -246,7 +246,10 @@ impl Actor for Vehicle {
         let part = self.rig.bodies().iter().position(|&body| contact.own.body == Some(body));
         if contact.phase != Phase::End && !contact.other.is_sensor {
             match part.and_then(|part| part.checked_sub(1)) {
-                Some(wheel) => self.touches.wheels[wheel] = true,
+                Some(wheel) => {
+                    self.touches.wheels[wheel] = true;
+                    return Response::RollOver;
+                }
                 None => self.touches.chassis = true,
             }
         }

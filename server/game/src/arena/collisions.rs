@@ -1,9 +1,15 @@
 //! Collisions come before the actors that have them, in the order in which the engine tells of them.
 
-use pita_sim::{Collision, CollisionObject, CollisionSide};
+use pita_sim::{BodyId, Collision, CollisionObject, CollisionSide, DVec3, QueryFilter, Shape};
 
 use super::Arena;
 use crate::actor::{Contact, ContactSide, Partner, Response};
+
+/// What counts as a kerb, m: no higher than this above what a body rolls on.
+const KERB: f64 = 0.15;
+
+/// So often it is asked whether there is room, m: no farther apart than a wheel is long.
+const SAMPLE: f64 = 0.3;
 
 impl Arena {
     /// Stage 3: both actors of every collision judge it; where one of them lets it pass, it passes.
@@ -14,7 +20,8 @@ impl Arena {
         for collision in &collisions {
             // Both are asked: hearing of a collision is the actor's only way to know of it.
             let answers = [self.ask(collision, 0), self.ask(collision, 1)];
-            if answers.contains(&Response::Pass) {
+            let rolls_over = |side: usize| answers[side] == Response::RollOver && self.rolls_over(collision, side);
+            if answers.contains(&Response::Pass) || rolls_over(0) || rolls_over(1) {
                 self.world.cancel_collision(collision.id);
             }
         }
@@ -41,6 +48,38 @@ impl Arena {
         let (own, other) = (side(own_side), side(other_side));
         let contact = Contact { phase, own, other, partner, point, normal, gap, approach_speed, impulse };
         self.actors.get_mut(owner).map_or(Response::Collide, |actor| actor.collide(&contact))
+    }
+
+    /// Whether a body rolls over what it is about to hit: it has room all along its way, as far above it as a kerb is high.
+    /// The plane of the contact, which is that of the start of the tick, would be a ramp that lifts a fast wheel higher than
+    /// that, and a wall to a faster one. What the wheel is in when the tick is over lifts it out.
+    fn rolls_over(&self, collision: &Collision, own: usize) -> bool {
+        let sides = [collision.sides[own], collision.sides[1 - own]].map(|side| side.object);
+        let [CollisionObject::Body(body), CollisionObject::Static(_)] = sides else { return false };
+        let towards = if own == 0 { collision.normal } else { -collision.normal };
+        let (Some(position), Some(rotation), Some(velocity)) =
+            (self.world.position(body), self.world.rotation(body), self.world.velocity(body))
+        else {
+            return false;
+        };
+        let way = velocity.with_y(0.0) * self.dt;
+        let forward = way.dot(towards.with_y(0.0));
+        if towards.y > 0.0 || forward < KERB * (-towards.y).max(0.5) {
+            return false;
+        }
+        let Some(shape) = self.shape_of(body) else { return false };
+        let samples = (way.length() / SAMPLE).ceil().max(1.0);
+        (1..=samples as usize).all(|i| {
+            let there = position + way * (i as f64 / samples) + DVec3::Y * KERB;
+            let found = self.world.overlap(shape, there, rotation, &QueryFilter::ALL);
+            found.is_ok_and(|found| !found.iter().any(|object| matches!(object, CollisionObject::Static(_))))
+        })
+    }
+
+    fn shape_of(&self, body: BodyId) -> Option<&Shape> {
+        let actor = self.actors.get(self.owners.get(&body)?)?;
+        let part = actor.bodies().iter().position(|&own| own == body)?;
+        Some(&actor.describe().parts.get(part)?.shape)
     }
 
     /// Whom a side belongs to. Every body has an actor.
