@@ -234,23 +234,23 @@ impl Problem {
     /// The guesses that are worth a look, most likely first. What rests goes on resting, what moves does again what it
     /// did; only an impact makes a difference that the first iteration does not mend, and what figures of parts do to
     /// themselves, at their joints' limits, is not seen from here.
-    pub(super) fn guesses(&self) -> &'static [Guess] {
-        let rests = || self.unknowns.iter().all(Unknown::rests);
+    pub(super) fn guesses(&mut self) -> &'static [Guess] {
         if self.is_parting {
-            &[Guess::Solution, Guess::Target, Guess::Before, Guess::Rest]
+            return &[Guess::Solution, Guess::Target, Guess::Before, Guess::Rest];
         } else if !self.solution.is_empty() {
-            &[Guess::Solution]
-        } else if self.figures.have_parts() || self.terms.contacts.iter().any(ContactTerm::is_impact) {
+            return &[Guess::Solution];
+        }
+        // What joints carry does not fall freely. Where nothing but contacts does, looking at all guesses leaves heaps
+        // calmer: without it 901 cubes that one rolls through took a tenth more bits.
+        let falls = !self.bends();
+        let hits = |contact: &ContactTerm| contact.is_impact() || falls && contact.may_hit();
+        let is_hit = self.figures.have_parts() || self.terms.contacts.iter().any(hits);
+        match (is_hit, self.unknowns.iter().all(Unknown::rests)) {
             // A crack that is nearly shut counts as an impact in every tick: what rests there is not to move for it.
-            if rests() {
-                &[Guess::Rest, Guess::Repeated, Guess::Before, Guess::Target]
-            } else {
-                &[Guess::Repeated, Guess::Before, Guess::Target, Guess::Rest]
-            }
-        } else if rests() {
-            &[Guess::Rest, Guess::Repeated]
-        } else {
-            &[Guess::Repeated]
+            (true, true) => &[Guess::Rest, Guess::Repeated, Guess::Before, Guess::Target],
+            (true, false) => &[Guess::Repeated, Guess::Before, Guess::Target, Guess::Rest],
+            (false, true) => &[Guess::Rest, Guess::Repeated],
+            (false, false) => &[Guess::Repeated],
         }
     }
 

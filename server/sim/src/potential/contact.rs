@@ -101,6 +101,8 @@ pub(crate) struct ContactTerm {
     limit: f64,
     /// It hits in this tick, or nothing is known of how it bears its load.
     is_impact: bool,
+    /// It would if nothing carried its bodies.
+    may_hit: bool,
     /// [`Blow::owed`] if its bodies meet in this tick.
     owed: f64,
     /// Its bodies are to part at a speed in this tick.
@@ -177,8 +179,8 @@ impl ContactTerm {
             Some(speed) => (approach.free + speed) * dt * BOUNCE_STIFFENING,
             None => approach.now * dt - point.gap.max(0.0),
         };
-        // By its own motion: what falls freely beside what carries it would count as hitting in every tick.
-        let closes = point.gap - approach.now * dt < settings.transition;
+        let bears_nothing = point.normal_force == 0.0;
+        let closes_at = |speed: f64| point.gap - speed * dt < settings.transition;
         let most_stiffening = (STIFFEST_LOADED / settings.normal_stiffness).max(1.0);
         let stiffening = point.stiffening.clamp(1.0, most_stiffening);
         let loaded = settings.normal_stiffness * stiffening;
@@ -204,7 +206,8 @@ impl ContactTerm {
             friction: point.surface.friction,
             anchor: point.anchor,
             limit: point.surface.friction * point.normal_force,
-            is_impact: overlap > settings.transition || (closes && point.normal_force == 0.0),
+            is_impact: overlap > settings.transition || (bears_nothing && closes_at(approach.now)),
+            may_hit: bears_nothing && closes_at(approach.free),
             owed,
             rebounds: parting_speed.is_some(),
             start_speed: approach.now,
@@ -243,6 +246,7 @@ impl ContactTerm {
             anchor: point.anchor,
             limit: 0.0,
             is_impact: true,
+            may_hit: true,
             owed: 0.0,
             rebounds: false,
             start_speed: 0.0,
@@ -253,6 +257,11 @@ impl ContactTerm {
     /// Whether it hits in this tick, or nothing is known of how it bears its load.
     pub fn is_impact(&self) -> bool {
         self.is_impact
+    }
+
+    /// Whether it would hit, or so, if its bodies fell freely.
+    pub fn may_hit(&self) -> bool {
+        self.may_hit
     }
 
     /// Displacement of b against a over the tick, m.
@@ -554,6 +563,7 @@ mod tests {
                 anchor: DVec3::ZERO,
                 limit: 0.0,
                 is_impact: false,
+                may_hit: false,
                 owed: 0.0,
                 rebounds: false,
                 start_speed: 0.0,
