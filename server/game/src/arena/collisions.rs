@@ -11,6 +11,9 @@ const KERB: f64 = 0.15;
 /// So often it is asked whether there is room, m: no farther apart than a wheel is long.
 const SAMPLE: f64 = 0.3;
 
+/// Most times that it is asked: what is faster, 270 m/s at 30 Hz, rolls over nothing.
+const SAMPLES_MAX: f64 = 30.0;
+
 impl Arena {
     /// Stage 3: both actors of every collision judge it; where one of them lets it pass, it passes.
     pub(super) fn judge_collisions(&mut self) {
@@ -64,11 +67,11 @@ impl Arena {
         };
         let way = velocity.with_y(0.0) * self.dt;
         let forward = way.dot(towards.with_y(0.0));
-        if towards.y > 0.0 || forward < KERB * (-towards.y).max(0.5) {
+        let samples = (way.length() / SAMPLE).ceil().max(1.0);
+        if towards.y > 0.0 || forward < KERB * (-towards.y).max(0.5) || samples > SAMPLES_MAX {
             return false;
         }
         let Some(shape) = self.shape_of(body) else { return false };
-        let samples = (way.length() / SAMPLE).ceil().max(1.0);
         (1..=samples as usize).all(|i| {
             let there = position + way * (i as f64 / samples) + DVec3::Y * KERB;
             let found = self.world.overlap(shape, there, rotation, &QueryFilter::ALL);
