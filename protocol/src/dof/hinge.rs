@@ -15,6 +15,9 @@ pub struct Hinge {
     pub angle: f64,
 }
 
+/// Below the least w of a tilt, the root of a half but for rounding.
+const LEAST_UPRIGHT: f64 = 0.5;
+
 impl Hinge {
     /// The unit quaternion x y z w; `None` where the axis is tilted by more than a right angle, where the angle about it
     /// means little.
@@ -33,11 +36,12 @@ impl Hinge {
         [x * cosine + y * sine, y * cosine - x * sine, upright * sine, upright * cosine]
     }
 
-    /// Angular velocity in the axes of its world, where the tilt and the angle change by `tilt` and `angle` a second.
+    /// Angular velocity in the axes of its world, where the tilt and the angle change by `tilt` and `angle` a second. Bounded
+    /// for tilts that no rotation has, too.
     pub fn angular_velocity(&self, tilt: [f64; 2], angle: f64) -> [f64; 3] {
         let ([x, y], w) = (self.tilt, self.upright());
         let [dx, dy] = tilt;
-        let dw = -(x * dx + y * dy) / w.max(f64::MIN_POSITIVE);
+        let dw = -(x * dx + y * dy) / w.max(LEAST_UPRIGHT);
         // Twice the tilt's derivative times its conjugate, and the turn about the axis as it is tilted.
         [
             2.0 * (dx * w - dw * x) + 2.0 * w * y * angle,

@@ -25,6 +25,8 @@ type Motion = ([f64; 7], [f64; 6]);
 
 /// Attached bodies may be attached to attached ones; malicious chains end here.
 const CHAIN_MAX: usize = 8;
+/// Groups of what others are attached to, a rigid body with its rates: it is looked at for each of them.
+const CARRIER_GROUPS_MAX: usize = 4;
 
 impl Frame {
     /// All bodies whose place is known, in order of id, for a stream of `tick_hz` ticks a second.
@@ -40,7 +42,7 @@ impl Frame {
     fn slice_of(&self, body: &Body, tick_hz: f64) -> Option<Slice> {
         let (mut q, mut v) = self.numbers(body, tick_hz);
         if body.parent.is_some() {
-            let (world, rates) = self.motion(body, tick_hz, CHAIN_MAX)?;
+            let (world, rates) = self.motion(body, (&q, &v), tick_hz, CHAIN_MAX)?;
             q.splice(..7, world);
             v.splice(..6, rates);
         }
@@ -84,12 +86,17 @@ impl Frame {
         (q, if told.is_empty() { tracked } else { told })
     }
 
-    /// Motion in the world of a body that begins with a point and a rotation.
-    fn motion(&self, body: &Body, tick_hz: f64, chain: usize) -> Option<Motion> {
-        let (q, v) = self.numbers(body, tick_hz);
-        let (q, v) = (*q.first_chunk::<7>()?, *v.first_chunk::<6>()?);
+    /// Motion in the world of a body with the numbers `q` and `v`; `None` where it, or what it is attached to, does not begin
+    /// with a point and a rotation.
+    fn motion(&self, body: &Body, (q, v): (&[f64], &[f64]), tick_hz: f64, chain: usize) -> Option<Motion> {
+        let [point, turn, ..] = self.groups(body) else { return None };
+        // Other numbers in their place are no unit quaternion, and grow along a chain beyond all bounds.
+        let is_placed = (point.value.group, turn.value.group.numbers()) == (Group::Point, 4);
+        let (q, v) = (*q.first_chunk::<7>()?, *v.first_chunk::<6>().filter(|_| is_placed)?);
         let Some(parent) = body.parent else { return Some((q, v)) };
-        let (frame, rates) = self.motion(self.find(parent)?, tick_hz, chain.checked_sub(1)?)?;
+        let parent = self.find(parent).filter(|parent| usize::from(parent.groups) <= CARRIER_GROUPS_MAX)?;
+        let (parent_q, parent_v) = self.numbers(parent, tick_hz);
+        let (frame, rates) = self.motion(parent, (&parent_q, &parent_v), tick_hz, chain.checked_sub(1)?)?;
         let turn = [frame[3], frame[4], frame[5], frame[6]];
         let world = absolute(&frame, &q);
         let arm = [world[0] - frame[0], world[1] - frame[1], world[2] - frame[2]];

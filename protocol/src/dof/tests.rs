@@ -7,6 +7,7 @@ use crate::WireError;
 
 mod cells;
 mod hostile;
+mod slices;
 
 const RIGID: [Group; 2] = [Group::Point, Group::Rotation];
 const HINGED: [Group; 2] = [Group::Point, Group::Hinge];
