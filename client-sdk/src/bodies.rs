@@ -184,6 +184,10 @@ impl Bodies {
                         false => had.before.clone().filter(|(_, at)| *at < tick),
                     };
                     entry.insert(known);
+                } else if !is_owns && source != had.source && had.awaited_since.is_some() {
+                    // What rests is told of as of some ticks ago: its state is no newer, but somebody has it again.
+                    let had = entry.get_mut();
+                    (had.source, had.awaited_since) = (source, None);
                 }
             }
         }
@@ -267,6 +271,19 @@ mod tests {
         take(&mut bodies, Source::Cell(CellId::WHOLE), 9, &[1], &[]);
         assert_eq!(seen(&mut bodies, 9), [(1, 9), (2, 5)]);
         assert_eq!(seen(&mut bodies, 6 + AWAITED_TICKS), [(1, 9)]);
+    }
+
+    /// A cell at rest says so each 32 ticks; what is asked for meanwhile is older than what another stream has told.
+    #[test]
+    fn who_rests_does_not_vanish_because_the_stream_that_has_it_now_told_of_it_before() {
+        let mut bodies = Bodies::default();
+        take(&mut bodies, Source::Cell(CellId::WHOLE), 20, &[1, 2], &[]);
+        bodies.await_others(CellId::WHOLE, 21);
+        take(&mut bodies, Source::Cell(A), 18, &[1], &[]);
+        assert_eq!(seen(&mut bodies, 21), [(1, 20), (2, 20)]);
+        assert_eq!(seen(&mut bodies, 21 + AWAITED_TICKS), [(1, 20)]);
+        take(&mut bodies, Source::Cell(A), 60, &[], &[]);
+        assert_eq!(seen(&mut bodies, 60), []);
     }
 
     #[test]
