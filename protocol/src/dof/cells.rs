@@ -25,6 +25,8 @@ use crate::cell::Keyframe;
 const QUIET_TICKS: u64 = 32;
 /// An epoch ends where its keyframes have come to so many bytes: an answer to who catches up is a message, too.
 const EPOCH_BYTES_MAX: usize = 2 << 20;
+/// Most keyframes of an epoch in which little happens: who catches up decodes them all.
+const EPOCH_KEYFRAMES_MAX: usize = 400;
 /// Groups of new bodies that wait for the next keyframe: until then each snapshot says all of them anew.
 const FRESH_GROUPS_MAX: usize = 64;
 /// For so many ticks it is said that there is no more news: once for those who lost the last, and once for those who did
@@ -40,7 +42,8 @@ pub struct Cadence {
     /// Ticks from one keyframe to the next are 2 to the power of this, 0 to 5. More of them lets predictions go further
     /// astray.
     pub keyframe_ticks_log2: u8,
-    /// Keyframes of an epoch at most, 1 to 100. More of them makes catching up longer.
+    /// Keyframes of an epoch, 1 to 100, and up to 400 where the others have not come to the bytes of its first: what rests is
+    /// not to be said again all the time. More of them makes catching up longer.
     pub epoch_keyframes: usize,
     /// Ticks from a keyframe to the first snapshot that is coded against it, 1 to 8. Who lost it learns of it a tick later,
     /// and has it a round trip after that.
@@ -232,7 +235,9 @@ impl CellEncoder {
     fn is_epoch_full(&self) -> bool {
         let Some(first) = self.epoch.first() else { return true };
         let bytes: usize = self.epoch.iter().map(|keyframe| keyframe.dof.len()).sum();
-        self.epoch.len() >= self.cadence.epoch_keyframes.clamp(1, 100)
+        let is_long = self.epoch.len() >= self.cadence.epoch_keyframes.clamp(1, 100);
+        (is_long && bytes >= 2 * first.dof.len())
+            || self.epoch.len() >= EPOCH_KEYFRAMES_MAX
             || bytes > first.dof.len() * (1 + usize::from(self.cadence.epoch_growth))
             || bytes > EPOCH_BYTES_MAX
     }

@@ -28,6 +28,9 @@ const CHOICE_TICKS: u64 = 4;
 /// Part of the budget that new layers may fill; those that are there already may fill all of it. What cells cost goes up
 /// and down, and who took a layer is not to drop it a moment later.
 const FILLED_BY_NEW: f64 = 0.85;
+/// Everything in one stream is taken where what comes of it at once fits into the budget of so long, s: in cells it comes
+/// bit by bit.
+const AT_ONCE_S: f64 = 1.0;
 /// Occupied cells at most; the rest of the list is for empty ones beside them.
 const OCCUPIED_MAX: usize = GRANTS_MAX / 2;
 
@@ -131,17 +134,22 @@ impl Grants {
     /// connection that keeps up, and as a whole.
     fn afford(&mut self, whole: &Offer) -> u8 {
         let (had, most) = (self.layers(CellId::WHOLE), self.bytes_per_tick * self.share - self.own);
+        let at_once = self.bytes_per_tick * self.tick_hz * AT_ONCE_S;
         if had == 0 {
-            let fits = whole.rates.iter().sum::<f64>() <= most * FILLED_BY_NEW;
+            let fits = whole.rates.iter().sum::<f64>() <= most * FILLED_BY_NEW && (whole.catch_up as f64) <= at_once;
             let is_paid = fits && self.share >= 1.0 && self.saved > 0.0;
             self.saved -= if is_paid { whole.catch_up as f64 } else { 0.0 };
             return if is_paid { whole::CADENCE.layers() } else { 0 };
         }
-        let sums = whole.rates.iter().scan(0.0, |sum, rate| {
-            *sum += rate;
-            Some(*sum)
-        });
-        sums.take(whole::CADENCE.layers().into()).filter(|sum| *sum <= most).count() as u8
+        if whole.first as f64 > at_once {
+            return 0;
+        }
+        let mut sum = 0.0;
+        let fits = |&layer: &u8| {
+            sum += whole.rates[usize::from(layer)];
+            sum <= if had > layer { most } else { most * FILLED_BY_NEW }
+        };
+        (0..whole::CADENCE.layers()).take_while(fits).count() as u8
     }
 
     /// Layers of occupied cells, as far as the budget goes.
@@ -190,7 +198,8 @@ impl Grants {
 fn with_neighbours(taken: &BTreeMap<CellId, u8>, offers: &[Offer]) -> Vec<CellGrant> {
     let mut all = taken.clone();
     for (cell, &layers) in taken.iter().filter(|(cell, _)| **cell != CellId::EVERYWHERE) {
-        let beside = |x: i16| [x.saturating_sub(1), x, x.saturating_add(1)];
+        // Those with the lowest number are no squares.
+        let beside = |x: i16| [x.saturating_sub(1).max(-i16::MAX), x, x.saturating_add(1)];
         for (x, z) in beside(cell.x).into_iter().flat_map(|x| beside(cell.z).map(|z| (x, z))) {
             let cell = CellId { x, z };
             let is_empty = offers.binary_search_by_key(&cell, |offer| offer.cell).is_err();

@@ -47,8 +47,10 @@ struct Offer {
     pub cell: CellId,
     /// Of each layer, bytes a tick.
     pub rates: [f64; LAYERS_MAX as usize],
-    /// Bytes that are sent at once.
+    /// Bytes that are sent at once to who takes it anew.
     pub catch_up: usize,
+    /// And to everybody when it begins anew, about.
+    pub first: usize,
 }
 
 /// All cells.
@@ -117,8 +119,10 @@ impl Cells {
         published.extend(streams.values_mut().filter_map(|stream| stream.publish(tick)));
         over.extend(streams.extract_if(.., |_, stream| stream.is_over(tick)).map(|(cell, _)| cell));
         offers.clear();
-        let offer =
-            |(&cell, stream): (&CellId, &Stream)| Offer { cell, rates: *stream.rates(), catch_up: stream.catch_up() };
+        let offer = |(&cell, stream): (&CellId, &Stream)| {
+            let (rates, catch_up, first) = (*stream.rates(), stream.catch_up(), stream.first());
+            Offer { cell, rates, catch_up, first }
+        };
         offers.extend(streams.iter().map(offer));
     }
 

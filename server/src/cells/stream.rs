@@ -15,6 +15,9 @@ const TOLD_TICKS: u64 = 16;
 const EMPTY_TICKS: u64 = 64;
 /// Weight of a tick in what a layer costs: two seconds at 30 Hz count.
 const MEASURED: f64 = 1.0 / 64.0;
+/// Share that a tick has in what it cost to begin anew, which comes in one piece and then not for a long time: as it is, it
+/// would make a cell look dear that costs next to nothing, and who takes it would drop it each time.
+const ANEW: f64 = 1.0 / 256.0;
 
 /// A snapshot of a cell, ready to be sent.
 #[derive(Debug)]
@@ -40,6 +43,8 @@ pub struct Stream {
     departures: VecDeque<(u64, Departure)>,
     /// Of each layer, bytes a tick.
     rates: [f64; LAYERS_MAX as usize],
+    /// Bytes of keyframes that need nothing, as far as they are not in that yet.
+    anew: f64,
     /// Last tick with a body in it.
     alive: u64,
 }
@@ -56,6 +61,7 @@ impl Stream {
             selection: Selection::new(settings.bytes_per_s, settings.tick_hz),
             departures: VecDeque::new(),
             rates: [0.0; LAYERS_MAX as usize],
+            anew: 0.0,
             alive: 0,
         }
     }
@@ -92,16 +98,28 @@ impl Stream {
         }
         self.forget_departures(tick);
         self.selection.fill();
-        let published = self.code(tick);
-        for (layer, rate) in self.rates.iter_mut().enumerate() {
-            let here = published.as_ref().filter(|published| usize::from(published.layer) == layer);
-            *rate += MEASURED * (here.map_or(0.0, |published| published.bytes.len() as f64) - *rate);
-        }
+        let due = self.encoder.due(tick, &self.state);
+        let published = due.map(|due| self.code(tick, due));
+        self.measure(due, published.as_ref());
         published
     }
 
-    fn code(&mut self, tick: u64) -> Option<Published> {
-        let due = self.encoder.due(tick, &self.state)?;
+    fn measure(&mut self, due: Option<Due>, published: Option<&Published>) {
+        let bytes = published.map_or(0.0, |published| published.bytes.len() as f64);
+        let mut of_layers = [0.0; LAYERS_MAX as usize];
+        match due {
+            Some(Due::Epoch) => self.anew += bytes,
+            _ => of_layers[published.map_or(0, |published| published.layer.into())] = bytes,
+        }
+        let share = ANEW * self.anew;
+        self.anew -= share;
+        of_layers[0] += share;
+        for (rate, bytes) in self.rates.iter_mut().zip(of_layers) {
+            *rate += MEASURED * (bytes - *rate);
+        }
+    }
+
+    fn code(&mut self, tick: u64, due: Due) -> Published {
         let chosen = self.selection.choose(self.encoder.needs(), &self.crowd);
         let coded = self.encoder.encode(tick, &self.state, due, chosen);
         let departures = self.departures.iter().map(|(_, departure)| departure.clone()).collect();
@@ -112,7 +130,7 @@ impl Stream {
         if due != Due::Epoch {
             self.selection.sent(bytes.len(), self.encoder.spent());
         }
-        Some(Published { cell: self.cell, layer, bytes, is_keyframe: keyframe_age == 0 })
+        Published { cell: self.cell, layer, bytes, is_keyframe: keyframe_age == 0 }
     }
 
     /// Whether it has been empty for so long that everybody knows.
@@ -128,6 +146,11 @@ impl Stream {
     /// Bytes that who comes anew is sent at once.
     pub fn catch_up(&self) -> usize {
         self.epoch().iter().map(|keyframe| keyframe.dof.len()).sum()
+    }
+
+    /// Bytes of its first keyframe, which come at once to all who take it when the next epoch begins.
+    pub fn first(&self) -> usize {
+        self.epoch().first().map_or(0, |keyframe| keyframe.dof.len())
     }
 
     /// Of each layer, bytes a tick.

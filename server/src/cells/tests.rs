@@ -309,3 +309,38 @@ fn who_can_have_everything_takes_it_in_one_stream_and_others_do_not() {
     let oldest = rich.known.values().min();
     assert!(rich.known.len() == 2002 && oldest > Some(&340), "{oldest:?}");
 }
+
+/// Ten thousand bodies at rest cost next to nothing, but to say them all at once is seconds of a small budget.
+#[test]
+fn a_newcomer_to_a_world_at_rest_is_not_sent_more_at_once_than_its_budget() {
+    let mut field = Field::new(10_000, 100_000);
+    field.car.1 = 0.5;
+    let mut cells = Cells::new(settings());
+    let mut sessions: [Option<Session>; 2] = [None, None];
+    for tick in 1..=700u64 {
+        field.at(tick);
+        cells.tick(tick, &field.state, &field.crowd);
+        for (session, bytes_per_s) in sessions.iter_mut().zip([8_000, 64_000]).filter(|_| tick > 200) {
+            session.get_or_insert_with(|| Session::new(bytes_per_s)).take(tick, &field, &cells);
+        }
+    }
+    for (session, bytes_per_s) in sessions.into_iter().flatten().zip([8_000, 64_000]) {
+        let of_second: Vec<usize> = session.bytes.chunks(30).map(|second| second.iter().sum()).collect();
+        assert!(of_second.iter().all(|&bytes| bytes < bytes_per_s * 2), "{bytes_per_s}: {of_second:?}");
+        assert_eq!(session.known.len(), 10_002, "{bytes_per_s}: {of_second:?}");
+    }
+}
+
+#[test]
+fn beside_the_last_square_is_no_other_stream() {
+    let mut cells = Cells::new(Settings { side_m: 1.0, ..settings() });
+    let (mut session, mut field) = (Session::new(64_000), Field::new(0, 1));
+    for tick in 1..=20 {
+        field.car = ([-32766.5, 32766.5], 0.0);
+        field.at(tick);
+        cells.tick(tick, &field.state, &field.crowd);
+        session.take(tick, &field, &cells);
+    }
+    assert!(session.cells.contains_key(&CellId { x: -32767, z: 32766 }), "{:?}", session.cells.keys());
+    assert!(session.cells.keys().all(|cell| cell.x > i16::MIN), "{:?}", session.cells.keys());
+}
