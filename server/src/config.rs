@@ -64,7 +64,7 @@ pub struct Network {
     pub message_bytes_max: Within<4096, 1_048_576>,
     /// Most that one client is sent of the state, bytes/s.
     pub client_bytes_per_s: Within<8_000, 10_000_000>,
-    /// Highest rate of inputs over one connection, Hz.
+    /// Highest rate of one player's inputs over one connection, Hz.
     pub input_rate_max_hz: Within<60, 100_000>,
 }
 

@@ -150,7 +150,8 @@ fn run_arena(configured: Configured, clock: Clock, out: &Output) -> Result<(), D
         // Before anything that has to be ended in order.
         let ending = watch_signals(Signals::new()?);
         let shared = Arc::new(share(config, &arena, source, clock)?);
-        let (session, endpoints) = network::open(&config.network, &shared.keys).await?;
+        let slots = shared.sessions().slots();
+        let (session, endpoints) = network::open(&config.network, &shared.keys, slots).await?;
         let mut serving = Serving::start(config, arena, doorkeeper, &shared, session)?;
         out.print(&report::welcome(&endpoints, &metrics::status(&shared)));
         let ended = watch(config, &shared, &mut serving, ending, out).await;

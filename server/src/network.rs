@@ -141,11 +141,11 @@ pub struct Endpoints {
     pub datagrams: Option<String>,
 }
 
-/// Opens the daemon's session; answers it with where it listens.
+/// Opens the daemon's session, for inputs of so many `slots`; answers it with where it listens.
 ///
 /// # Errors
 /// [`NetworkError`], before anything listens.
-pub async fn open(config: &Network, keys: &Keys) -> Result<(zenoh::Session, Endpoints), NetworkError> {
+pub async fn open(config: &Network, keys: &Keys, slots: u16) -> Result<(zenoh::Session, Endpoints), NetworkError> {
     let address = |of: Use, endpoint: &str| {
         of.address(endpoint).map_err(|reason| NetworkError::Endpoint { key: of.key(), reason })
     };
@@ -160,7 +160,7 @@ pub async fn open(config: &Network, keys: &Keys) -> Result<(zenoh::Session, Endp
         let control = Use::Control.free_address(&config.listen, wanted)?;
         let free = |wanted| Use::Datagrams.free_address(&config.datagrams, wanted);
         let endpoints = Endpoints { control, datagrams: datagrams.map(free).transpose()? };
-        match zenoh::open(configuration(config, keys, &endpoints)).await {
+        match zenoh::open(configuration(config, keys, slots, &endpoints)).await {
             Ok(session) => return Ok((session, endpoints)),
             Err(_) if has_free_port && attempt < FREE_PORT_ATTEMPTS => attempt += 1,
             Err(reason) => {
@@ -182,9 +182,12 @@ pub fn check_endpoints(config: &Network) -> Result<(), (&'static str, String)> {
     Ok(())
 }
 
-fn configuration(config: &Network, keys: &Keys, endpoints: &Endpoints) -> zenoh::Config {
+fn configuration(config: &Network, keys: &Keys, slots: u16, endpoints: &Endpoints) -> zenoh::Config {
     let listen: Vec<_> = [Some(&endpoints.control), endpoints.datagrams.as_ref()].into_iter().flatten().collect();
-    let inputs = keys.all_inputs();
+    let inputs: Vec<_> = (0..slots).map(|slot| keys.input(slot)).collect();
+    // Slot by slot: over the one connection of a router come the inputs of all behind it, all of them aimed at the same moment.
+    let freq = config.input_rate_max_hz.get();
+    let rates: Vec<_> = inputs.iter().map(|key| json!({ "key_expr": key, "freq": freq })).collect();
     let settings = [
         ("mode", json!("peer")),
         ("listen/endpoints", json!(listen)),
@@ -203,16 +206,12 @@ fn configuration(config: &Network, keys: &Keys, endpoints: &Endpoints) -> zenoh:
         ("transport/link/rx/max_message_size", json!(config.message_bytes_max.get())),
         (
             "low_pass_filter",
-            json!([{ "flows": ["ingress"], "messages": ["put"], "key_exprs": [inputs], "size_limit": INPUT_FILTER_BYTES }]),
+            json!([{ "flows": ["ingress"], "messages": ["put"], "key_exprs": [keys.all_inputs()], "size_limit": INPUT_FILTER_BYTES }]),
         ),
-        (
-            "downsampling",
-            json!([{ "flows": ["ingress"], "messages": ["put"],
-                     "rules": [{ "key_expr": inputs, "freq": config.input_rate_max_hz.get() }] }]),
-        ),
+        ("downsampling", json!([{ "flows": ["ingress"], "messages": ["put"], "rules": rates }])),
     ];
     let mut zenoh = zenoh::Config::default();
-    let settings = settings.into_iter().chain([("access_control", access_rules(keys))]);
+    let settings = settings.into_iter().chain([("access_control", access_rules(keys, &inputs))]);
     for (key, value) in settings {
         // Keys and types are Zenoh's own and do not depend on input beyond the ranges of `Network`; a test has them all.
         zenoh.insert_json5(key, &value.to_string()).expect("a setting of Zenoh");
@@ -220,8 +219,8 @@ fn configuration(config: &Network, keys: &Keys, endpoints: &Endpoints) -> zenoh:
     zenoh
 }
 
-/// What clients may do: put inputs, ask, listen, show their tokens. Everything else is denied.
-fn access_rules(keys: &Keys) -> serde_json::Value {
+/// What clients may do: put `inputs`, ask, listen, show their tokens. Everything else is denied.
+fn access_rules(keys: &Keys, inputs: &[String]) -> serde_json::Value {
     let questions = [
         keys.join(),
         keys.all_says(),
@@ -254,7 +253,7 @@ fn access_rules(keys: &Keys) -> serde_json::Value {
         "enabled": true,
         "default_permission": "deny",
         "rules": [
-            allow("inputs", "ingress", &["put"], &[keys.all_inputs()]),
+            allow("inputs", "ingress", &["put"], inputs),
             allow("questions", "ingress", &["query"], &questions),
             allow("listening", "ingress", &["declare_subscriber"], &[keys.all_snapshots(), keys.all_cells(), keys.event()]),
             allow("tokens", "ingress", &["liveliness_token"], &[keys.all_live()]),
@@ -280,7 +279,7 @@ mod tests {
     fn zenoh_knows_every_setting() {
         let [control, datagrams] = ["tcp/127.0.0.1:7447", "udp/127.0.0.1:7447"].map(str::to_owned);
         let endpoints = Endpoints { control, datagrams: Some(datagrams) };
-        configuration(&ServerConfig::built_in().network, &Keys::new("a").unwrap(), &endpoints);
+        configuration(&ServerConfig::built_in().network, &Keys::new("a").unwrap(), 3, &endpoints);
     }
 
     /// What arrives first at a client that listens on `key` while another client and then the server put there.
@@ -308,7 +307,7 @@ mod tests {
     async fn clients_cannot_speak_for_the_server() {
         let keys = Keys::new("a").unwrap();
         let config = Network { listen: "tcp/127.0.0.1:0".to_owned(), ..ServerConfig::built_in().network };
-        let (server, Endpoints { control: endpoint, .. }) = open(&config, &keys).await.unwrap();
+        let (server, Endpoints { control: endpoint, .. }) = open(&config, &keys, 4).await.unwrap();
         let answer = |query: zenoh::query::Query| drop(query.reply("pita/a/status", "").wait());
         server.declare_queryable(keys.status()).callback(answer).background().await.unwrap();
         let all = async {
