@@ -74,6 +74,8 @@ async fn inputs_that_cannot_be_are_dropped_and_counted() {
     *forged.last_mut().unwrap() ^= 1;
     mallory.send(&forged).await;
     mallory.send_as(mallory.joined.slot + 1, &good).await;
+    mallory.send_as(mallory.joined.slot + 2, &good).await;
+    // Of slots that there are not nobody hears.
     mallory.send_as(9999, &good).await;
     (expected.input_forged, expected.input_no_session) = (1, 2);
     await_refused(&observer, expected).await;
@@ -151,7 +153,7 @@ impl<'a> Mallory<'a> {
     }
 
     async fn send_as(&self, slot: u16, bytes: &[u8]) {
-        // Faster inputs than the server's limit of a connection are dropped before anything counts them.
+        // Inputs of a slot that come faster than the server's limit are dropped before anything counts them.
         tokio::time::sleep(std::time::Duration::from_millis(5)).await;
         self.observer.session().put(self.observer.keys().input(slot), bytes).await.unwrap();
     }
