@@ -11,7 +11,7 @@ use super::pull_back::{add_block, inertia_block, pull_back};
 use crate::collide::Foot;
 use crate::dof::{ABSENT, Columns, FigureBody, Frame, Inertia, PartPoint, Twist};
 use crate::potential::gravity::Gravity;
-use crate::potential::{PairBlocks, Wrench};
+use crate::potential::{BetweenFrames, Wrench};
 
 /// Takes blocks of a symmetric matrix.
 pub(crate) trait Blocks {
@@ -223,7 +223,7 @@ impl Figures {
     }
 
     /// Adds to the Hessian on attachment `k` what a term has there at its `end`.
-    pub fn stiffen(&mut self, k: usize, term: &PairBlocks, end: usize, factor: f64) {
+    pub fn stiffen(&mut self, k: usize, term: &impl BetweenFrames, end: usize, factor: f64) {
         let target = &mut self.hessians[k];
         if self.attachments[k].follows == Follows::Place {
             add_block(target, &term.own::<3>(end), factor);

@@ -11,7 +11,7 @@ use super::solver::work::block;
 use glam::DMat3;
 
 use crate::dof::{Columns, Frame};
-use crate::potential::{FIXED, FrameIndex, Term};
+use crate::potential::{BetweenFrames, FIXED, FrameIndex, PointSum, Term};
 
 /// Marks a term without an off-diagonal block.
 const NONE: u32 = u32::MAX;
@@ -117,7 +117,7 @@ impl<const D: usize> Matrix<D> {
 
 /// What a block of unknowns weighs by itself. A figure adds its inertia later; rates that a block does not have are held
 /// at zero by a unit mass.
-fn inertia_block<const D: usize>(unknown: &Unknown) -> Block<D> {
+pub(super) fn inertia_block<const D: usize>(unknown: &Unknown) -> Block<D> {
     let mut block = zero();
     for (i, row) in block.iter_mut().enumerate() {
         match unknown {
@@ -247,36 +247,64 @@ struct Assemble<'a, const D: usize> {
 
 impl<const D: usize> Visitor for Assemble<'_, D> {
     fn visit<T: Term>(&mut self, terms: &mut [T]) {
-        let factor = self.dt * self.dt;
-        let blocks = self.matrix.diagonal.len();
+        if T::IS_OF_POINTS {
+            return self.add_points(terms);
+        }
         for term in terms {
             let slot = self.slots.next().copied().unwrap_or(NONE);
             let at = pair(self.frames, term);
-            if term.is_idle(self.dt, at) {
-                continue;
-            }
-            let hessian = term.hessian(self.dt, at);
-            let frames = term.frames();
-            for (end, &frame) in frames.iter().enumerate().filter(|&(_, &frame)| frame != FIXED) {
-                match self.matrix.diagonal.get_mut(frame as usize) {
-                    Some(diagonal) => add_scaled(diagonal, &hessian.own::<D>(end), factor),
-                    // Summed up at the point and pulled back once for all terms.
-                    None => self.figures.stiffen(frame as usize - blocks, &hessian, end, factor),
-                }
-            }
-            let [a, b] = frames;
-            if slot != NONE {
-                let ab = hessian.between::<D>();
-                let below = if a < b { transpose(&ab) } else { ab };
-                add_scaled(&mut self.matrix.lower[slot as usize], &below, factor);
-            } else if a != FIXED && b != FIXED {
-                self.pull_back([a, b], &hessian.between::<6>(), factor);
+            if !term.is_idle(self.dt, at) {
+                let hessian = term.hessian(self.dt, at);
+                self.add(term.frames(), slot, &hessian);
             }
         }
     }
 }
 
 impl<const D: usize> Assemble<'_, D> {
+    /// Points between the same two frames one after the other are added at once.
+    fn add_points<T: Term>(&mut self, terms: &[T]) {
+        let mut pending: Option<([FrameIndex; 2], u32, PointSum)> = None;
+        for term in terms {
+            let slot = self.slots.next().copied().unwrap_or(NONE);
+            let at = pair(self.frames, term);
+            if term.is_idle(self.dt, at) {
+                continue;
+            }
+            let point = PointSum::of(&term.hessian(self.dt, at));
+            if let Some((frames, slot, sum)) = &mut pending {
+                if *frames == term.frames() && sum.join(&point) {
+                    continue;
+                }
+                self.add(*frames, *slot, sum);
+            }
+            pending = Some((term.frames(), slot, point));
+        }
+        if let Some((frames, slot, sum)) = &pending {
+            self.add(*frames, *slot, sum);
+        }
+    }
+
+    /// Adds what acts between two frames.
+    fn add(&mut self, [a, b]: [FrameIndex; 2], slot: u32, hessian: &impl BetweenFrames) {
+        let factor = self.dt * self.dt;
+        let blocks = self.matrix.diagonal.len();
+        for (end, frame) in [a, b].into_iter().enumerate().filter(|&(_, frame)| frame != FIXED) {
+            match self.matrix.diagonal.get_mut(frame as usize) {
+                Some(diagonal) => add_scaled(diagonal, &hessian.own::<D>(end), factor),
+                // Summed up at the point and pulled back once for all terms.
+                None => self.figures.stiffen(frame as usize - blocks, hessian, end, factor),
+            }
+        }
+        if slot != NONE {
+            let ab = hessian.between::<D>();
+            let below = if a < b { transpose(&ab) } else { ab };
+            add_scaled(&mut self.matrix.lower[slot as usize], &below, factor);
+        } else if a != FIXED && b != FIXED {
+            self.pull_back([a, b], &hessian.between::<6>(), factor);
+        }
+    }
+
     /// Adds what a term does between two ends of which one is a material point of a figure: Jᵀ H J over all blocks that
     /// move them.
     fn pull_back(&mut self, [a, b]: [FrameIndex; 2], ab: &Block<6>, factor: f64) {

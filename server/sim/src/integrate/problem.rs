@@ -140,9 +140,18 @@ impl Unknown {
     }
 
     /// Its own inertia times rates; a figure's is added elsewhere.
-    fn inertia_product<const D: usize>(&self, x: &Entry<D>) -> Entry<D> {
+    pub(super) fn inertia_product<const D: usize>(&self, x: &Entry<D>) -> Entry<D> {
         let Self::Body(node) = self else { return [0.0; D] };
         let Twist { linear, angular } = twist_of(x);
+        entry_of(Twist { linear: node.mass * linear, angular: node.inertia * angular })
+    }
+
+    /// A body's momentum at rates `u` beyond what it would have without potentials, kg m/s and kg m²/s; nothing of a
+    /// figure's.
+    pub(super) fn momentum_gained<const D: usize>(&self, u: &Entry<D>) -> Entry<D> {
+        let Self::Body(node) = self else { return [0.0; D] };
+        let Twist { linear, angular } = twist_of(u);
+        let (linear, angular) = (linear - node.target.linear, angular - node.target.angular);
         entry_of(Twist { linear: node.mass * linear, angular: node.inertia * angular })
     }
 
@@ -165,7 +174,7 @@ impl Unknown {
     }
 
     /// Squared residual in energy norm, over the mass: a squared speed, m²/s².
-    fn residual_speed_squared<const D: usize>(&self, entry: &Entry<D>) -> f64 {
+    pub(super) fn residual_speed_squared<const D: usize>(&self, entry: &Entry<D>) -> f64 {
         match self {
             Self::Body(node) => {
                 let Twist { linear, angular } = twist_of(entry);

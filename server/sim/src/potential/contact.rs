@@ -291,10 +291,10 @@ impl ContactTerm {
         (slip, length, length * (self.tangent_stiffness / self.limit.max(1e-300)))
     }
 
-    /// Energy and gradient where the normal spline has this integral and value.
+    /// Energy and its gradient by the displacement where the normal spline has this integral and value.
     // The innermost loop of all: what is not asked for of the answer need not be written to memory.
     #[inline(always)]
-    fn pushes<S: Scalar>(&self, displacement: Vec3<S>, (integral, value): (S, S)) -> (S, [Wrench<S>; 2]) {
+    fn force<S: Scalar>(&self, displacement: Vec3<S>, (integral, value): (S, S)) -> (S, Vec3<S>) {
         let mut energy = integral * self.normal_stiffness;
         let mut force = Vec3::constant(self.normal).scale(-value * self.normal_stiffness);
         if self.limit > 0.0 {
@@ -305,9 +305,58 @@ impl ContactTerm {
                 force += slip.scale(value * self.limit / length);
             }
         }
+        (energy, force)
+    }
+
+    /// Energy and gradient on both frames.
+    #[inline(always)]
+    fn pushes<S: Scalar>(&self, displacement: Vec3<S>, normal: (S, S)) -> (S, [Wrench<S>; 2]) {
+        let (energy, force) = self.force(displacement, normal);
         // Nobody asks for what acts on the world.
         let on_b = if self.on_world() { Wrench::ZERO } else { Wrench::at_fixed(force, self.arms[1]) };
         (energy, [Wrench::at_fixed(-force, self.arms[0]), on_b])
+    }
+
+    /// Positive semidefinite second derivative of the energy by the displacement, N/m.
+    #[inline(always)]
+    pub fn stiffness(&self, displacement: DVec3) -> DMat3 {
+        let displacement = displacement.into();
+        let nn = outer(self.normal, self.normal);
+        let mut k = nn * (self.normal_stiffness * normal_slope(self.depth(displacement), self.transition));
+        if self.limit > 0.0 {
+            let (slip, length, x) = self.slip(displacement);
+            let secant = if x > 0.0 { friction_patch(x).1 / x } else { 1.0 };
+            let tangent = DMat3::IDENTITY - nn;
+            k += tangent * (self.tangent_stiffness * secant);
+            if length > 0.0 {
+                // The tangent alone vanishes where it slides, and Newton then jumps to and fro across the anchor.
+                let direction = DVec3::from(slip) / length;
+                let slope = (friction_slope(x) - secant) * TANGENT_SHARE;
+                k += outer(direction, direction) * (self.tangent_stiffness * slope);
+            }
+        }
+        k
+    }
+
+    /// From the frames' origins to the point, m.
+    pub fn arms(&self) -> [DVec3; 2] {
+        self.arms
+    }
+
+    /// As [`ContactTerm::gradient`], with friction limited as it is there.
+    #[inline]
+    pub fn limited_gradient(&mut self, displacement: DVec3) -> DVec3 {
+        let displacement = displacement.into();
+        let normal = normal_spline(self.depth(displacement), self.transition);
+        self.limit = self.friction * self.normal_stiffness * normal.1;
+        self.force(displacement, normal).1.into()
+    }
+
+    /// Gradient of the energy by the displacement, N.
+    #[inline]
+    pub fn gradient(&self, displacement: DVec3) -> DVec3 {
+        let displacement = displacement.into();
+        self.force(displacement, normal_spline(self.depth(displacement), self.transition)).1.into()
     }
 
     /// Normal force, N.
@@ -443,6 +492,8 @@ impl ContactTerm {
 }
 
 impl Term for ContactTerm {
+    const IS_OF_POINTS: bool = true;
+
     fn frames(&self) -> [FrameIndex; 2] {
         self.frames
     }
@@ -472,22 +523,7 @@ impl Term for ContactTerm {
 
     #[inline(always)]
     fn hessian(&self, dt: f64, at: [&Frame<f64>; 2]) -> PairBlocks {
-        let displacement = self.displacement(dt, at);
-        let nn = outer(self.normal, self.normal);
-        let mut k = nn * (self.normal_stiffness * normal_slope(self.depth(displacement), self.transition));
-        if self.limit > 0.0 {
-            let (slip, length, x) = self.slip(displacement);
-            let secant = if x > 0.0 { friction_patch(x).1 / x } else { 1.0 };
-            let tangent = DMat3::IDENTITY - nn;
-            k += tangent * (self.tangent_stiffness * secant);
-            if length > 0.0 {
-                // The tangent alone vanishes where it slides, and Newton then jumps to and fro across the anchor.
-                let direction = DVec3::from(slip) / length;
-                let slope = (friction_slope(x) - secant) * TANGENT_SHARE;
-                k += outer(direction, direction) * (self.tangent_stiffness * slope);
-            }
-        }
-        PairBlocks::of_points(k, self.arms[0], self.arms[1])
+        PairBlocks::of_points(self.stiffness(self.displacement(dt, at).into()), self.arms[0], self.arms[1])
     }
 
     fn stiffen(&mut self, dt: f64, at: [&Frame<f64>; 2]) -> bool {
@@ -509,6 +545,7 @@ impl Term for ContactTerm {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::potential::BetweenFrames;
 
     /// Value and derivative are continuous and are the derivatives of one another.
     #[test]

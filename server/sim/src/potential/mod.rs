@@ -16,6 +16,7 @@ pub(crate) mod hinge;
 pub(crate) mod hold;
 pub(crate) mod limit;
 pub(crate) mod motor;
+mod pair_blocks;
 pub(crate) mod pd;
 mod pool;
 pub(crate) mod restitution;
@@ -40,6 +41,7 @@ pub use hinge::{HingeDesc, HingeId};
 use hold::Held;
 pub use limit::{AngleLimitDesc, AngleLimitId, DistanceLimitDesc, DistanceLimitId};
 pub use motor::{Driven, MotorDesc, MotorId};
+pub(crate) use pair_blocks::{BetweenFrames, PairBlocks, PointSum};
 pub use pd::{PdControl, PdDesc, PdGains, PdId};
 use pool::Pool;
 pub use rod::{RodDesc, RodId};
@@ -49,7 +51,6 @@ pub use universal_joint::{UniversalJointDesc, UniversalJointId};
 
 use crate::autodiff::{Dual, Scalar, Vec3};
 use crate::dof::{BodyId, Frame, Twist};
-use crate::integrate::block::Block;
 
 /// A point of a body, or of the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -281,25 +282,13 @@ impl AddAssign for Wrench {
     }
 }
 
-/// Hessian of a term with respect to the displacements of its two frames, as what its blocks are made of: a stiffness
-/// between two points, and stiffnesses against turns. The blocks, translation first, rotation second, are made where they
-/// are added: against the world only one of the three is wanted.
-#[derive(Clone, Debug)]
-pub(crate) struct PairBlocks {
-    /// N/m.
-    points: DMat3,
-    /// From the frames' origins to the points, m.
-    arms: [DVec3; 2],
-    /// Against turns of either by itself, N m.
-    turns: [DMat3; 2],
-    /// Between the turns of both, N m.
-    turns_between: DMat3,
-}
-
 /// A potential between two frames of an island.
 pub(crate) trait Term {
     /// Whether it holds something on an arc by a stiffness, so that straight steps run into it.
     const BENDS: bool = false;
+
+    /// Whether its Hessian is that of [`PairBlocks::of_points`] alone.
+    const IS_OF_POINTS: bool = false;
 
     /// The frames; either may be [`FIXED`].
     fn frames(&self) -> [FrameIndex; 2];
@@ -338,86 +327,6 @@ pub(crate) trait Term {
 /// [r]×, the matrix of the cross product.
 pub(crate) fn cross_matrix(r: DVec3) -> DMat3 {
     DMat3::from_cols(DVec3::new(0.0, r.z, -r.y), DVec3::new(-r.z, 0.0, r.x), DVec3::new(r.y, -r.x, 0.0))
-}
-
-impl PairBlocks {
-    /// Hessian of ½ dᵀ K d, K symmetric, d the displacement of the point at `arm_b` of b against the one at `arm_a` of a.
-    pub fn of_points(k: DMat3, arm_a: DVec3, arm_b: DVec3) -> Self {
-        Self { points: k, arms: [arm_a, arm_b], turns: [DMat3::ZERO; 2], turns_between: DMat3::ZERO }
-    }
-
-    /// Adds the Hessian of ½ tᵀ K t, t the turn of b against a.
-    pub fn add_rotation(&mut self, k: DMat3) {
-        self.add_rotation_a(k);
-        self.add_rotation_b(k);
-        self.turns_between -= k;
-    }
-
-    /// Adds to the rotation block of a alone.
-    pub fn add_rotation_a(&mut self, k: DMat3) {
-        self.turns[0] += k;
-    }
-
-    /// Adds to the rotation block of b alone.
-    pub fn add_rotation_b(&mut self, k: DMat3) {
-        self.turns[1] += k;
-    }
-
-    /// Second derivative by the displacement of one frame, 0 is a, 1 is b: all of it with R = 6, that of places with 3.
-    #[inline(always)]
-    pub fn own<const R: usize>(&self, end: usize) -> Block<R> {
-        if R <= 3 {
-            return quarter(&self.points, 1.0);
-        }
-        // J = [I, −[r]×]: Jᵀ K J = [K, −K [r]×; [r]× K, −[r]× K [r]×].
-        let k = turned(&self.points, self.arms[end]);
-        block(self.points, -k, -k.transpose(), self.turns[end] - crossed(self.arms[end], &k))
-    }
-
-    /// Second derivative by the displacements of a, rows, and b, columns; R as in [`PairBlocks::own`].
-    #[inline(always)]
-    pub fn between<const R: usize>(&self) -> Block<R> {
-        if R <= 3 {
-            return quarter(&self.points, -1.0);
-        }
-        let (ka, kb) = (turned(&self.points, self.arms[0]), turned(&self.points, self.arms[1]));
-        block(-self.points, kb, ka.transpose(), self.turns_between + crossed(self.arms[0], &kb))
-    }
-}
-
-/// K [r]×, whose columns are the images of r × the axes, negated.
-#[inline]
-fn turned(k: &DMat3, r: DVec3) -> DMat3 {
-    let [x, y, z] = [k.x_axis, k.y_axis, k.z_axis];
-    DMat3::from_cols(y * r.z - z * r.y, z * r.x - x * r.z, x * r.y - y * r.x)
-}
-
-/// [r]× M.
-#[inline]
-fn crossed(r: DVec3, m: &DMat3) -> DMat3 {
-    DMat3::from_cols(r.cross(m.x_axis), r.cross(m.y_axis), r.cross(m.z_axis))
-}
-
-/// `factor` × the symmetric `k` as the leading part of a block.
-#[inline]
-fn quarter<const R: usize>(k: &DMat3, factor: f64) -> Block<R> {
-    let columns = k.to_cols_array_2d();
-    std::array::from_fn(|i| std::array::from_fn(|j| if i < 3 && j < 3 { factor * columns[i][j] } else { 0.0 }))
-}
-
-/// A block out of its quarters: translation by translation, translation by rotation, and so on.
-// Number by number: a matrix that is copied as a whole right after it was made waits for its numbers to arrive in memory.
-#[inline(always)]
-fn block<const R: usize>(ll: DMat3, la: DMat3, al: DMat3, aa: DMat3) -> Block<R> {
-    let mut block = [[0.0; R]; R];
-    for (quarter, row, column) in [(ll, 0, 0), (la, 0, 3), (al, 3, 0), (aa, 3, 3)] {
-        for (j, axis) in [quarter.x_axis, quarter.y_axis, quarter.z_axis].into_iter().enumerate() {
-            for (i, number) in [axis.x, axis.y, axis.z].into_iter().enumerate() {
-                block[row + i][column + j] = number;
-            }
-        }
-    }
-    block
 }
 
 /// Positive part of the geometric stiffness of a gradient `force` that acts at `arm`, with respect to turns of the body.

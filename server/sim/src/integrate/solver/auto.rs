@@ -58,6 +58,10 @@ impl<const D: usize> Solver<D> for Auto<D> {
         iterations
     }
 
+    fn starts_by_blocks(&self) -> bool {
+        true
+    }
+
     fn follow_friction(&mut self, problem: &Problem, work: &mut Work, step: &mut [Entry<D>]) -> usize {
         if self.was_direct { self.newton.follow_friction(problem, work, step) } else { 0 }
     }

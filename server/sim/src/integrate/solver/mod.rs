@@ -5,6 +5,7 @@
 //! `method`; `auto` chooses by itself. Nothing here knows a potential or a DOF kind.
 
 mod auto;
+mod block_descent;
 mod cel_damage;
 mod descent;
 mod discrete_newton;
@@ -48,6 +49,11 @@ pub(super) trait Solver<const D: usize> {
 
     /// Hears how far the line search went, in steps, and of the residual there, before anything is taken anew.
     fn walked(&mut self, _alpha: f64, _step: &[Entry<D>], _residual: &[Entry<D>]) {}
+
+    /// Whether block descent comes first where things hit one another.
+    fn starts_by_blocks(&self) -> bool {
+        false
+    }
 
     /// How the line search walks.
     fn walk(&self) -> Walk {
