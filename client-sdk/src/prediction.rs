@@ -11,7 +11,7 @@ use glam::{DQuat, DVec3};
 use pita_game::{ArenaSettings, BodyState, CarState, Controls as GameControls, Rehearsal};
 use pita_protocol::{
     dof::{Group, Slice, kind},
-    message::{ArenaSource, Controls, buttons},
+    message::{ArenaSource, Controls},
 };
 
 /// Ticks that are kept: more than any lead; a prediction further ahead than that begins anew.
@@ -236,18 +236,7 @@ pub fn body_state(slice: &Slice) -> Option<BodyState> {
 
 /// Controls in the words of the game.
 fn to_game(input: &Controls) -> GameControls {
-    GameControls {
-        throttle: input.throttle.into(),
-        brake: input.brake.into(),
-        steer: input.steer.into(),
-        reverse: input.holds(buttons::REVERSE),
-        handbrake: input.holds(buttons::HANDBRAKE),
-        reset: input.holds(buttons::RESET),
-        boost: input.holds(buttons::BOOST),
-        jump: input.holds(buttons::JUMP),
-        fire: input.holds(buttons::FIRE),
-        next_weapon: input.holds(buttons::NEXT_WEAPON),
-    }
+    GameControls::of([input.throttle, input.brake, input.steer], input.buttons)
 }
 
 #[cfg(test)]

@@ -119,7 +119,8 @@ impl Drivers {
             if now.tick.saturating_sub(seat.heard_tick) >= self.coast_after_ticks {
                 seat.controls = Controls::default();
             }
-            let mut controls = to_game(&seat.controls);
+            let Controls { throttle, brake, steer, buttons: held } = seat.controls;
+            let mut controls = GameControls::of([throttle, brake, steer], held);
             controls.reset |= std::mem::take(&mut seat.reset_pressed);
             into.push(Command::Drive { slot, controls });
             seat.controls.buttons &= !buttons::RESET;
@@ -203,22 +204,6 @@ impl Seat {
         self.ack.fates.set(behind, InputFate::Superseded);
         self.reset_pressed |= frame.controls.holds(buttons::RESET);
         counts.superseded += 1;
-    }
-}
-
-/// Controls in the words of the game.
-fn to_game(input: &Controls) -> GameControls {
-    GameControls {
-        throttle: input.throttle.into(),
-        brake: input.brake.into(),
-        steer: input.steer.into(),
-        reverse: input.holds(buttons::REVERSE),
-        handbrake: input.holds(buttons::HANDBRAKE),
-        reset: input.holds(buttons::RESET),
-        boost: input.holds(buttons::BOOST),
-        jump: input.holds(buttons::JUMP),
-        fire: input.holds(buttons::FIRE),
-        next_weapon: input.holds(buttons::NEXT_WEAPON),
     }
 }
 

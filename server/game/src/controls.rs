@@ -26,6 +26,24 @@ pub struct Controls {
 }
 
 impl Controls {
+    /// Throttle, brake and steering, and what is held besides as bits, the lowest first: reverse, handbrake, reset, boost,
+    /// jump, fire, next weapon.
+    pub fn of([throttle, brake, steer]: [f32; 3], buttons: u16) -> Self {
+        let holds = |bit: u32| buttons >> bit & 1 == 1;
+        Self {
+            throttle: throttle.into(),
+            brake: brake.into(),
+            steer: steer.into(),
+            reverse: holds(0),
+            handbrake: holds(1),
+            reset: holds(2),
+            boost: holds(3),
+            jump: holds(4),
+            fire: holds(5),
+            next_weapon: holds(6),
+        }
+    }
+
     /// The same controls with every number in its range; what is no number counts as released.
     pub fn in_range(self) -> Self {
         let ratio = |x: f64, least: f64| if x.is_nan() { 0.0 } else { x.clamp(least, 1.0) };

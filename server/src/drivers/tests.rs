@@ -140,3 +140,28 @@ fn no_choice_of_sequences_and_ticks_takes_time_or_memory() {
     assert_eq!(ack(&drivers).sequence, u32::MAX);
     assert!(drivers.counts().missing < FATES_MAX as u64);
 }
+
+/// The wire's bits are the game's.
+#[test]
+fn every_button_does_what_its_name_says() {
+    let none = GameControls::of([0.25, 0.5, -1.0], 0);
+    assert_eq!(none, GameControls { throttle: 0.25, brake: 0.5, steer: -1.0, ..GameControls::default() });
+    for (button, held) in [
+        (buttons::REVERSE, GameControls { reverse: true, ..none }),
+        (buttons::HANDBRAKE, GameControls { handbrake: true, ..none }),
+        (buttons::RESET, GameControls { reset: true, ..none }),
+        (buttons::BOOST, GameControls { boost: true, ..none }),
+        (buttons::JUMP, GameControls { jump: true, ..none }),
+        (buttons::FIRE, GameControls { fire: true, ..none }),
+        (buttons::NEXT_WEAPON, GameControls { next_weapon: true, ..none }),
+    ] {
+        let mut drivers = seated();
+        let controls = Controls { throttle: 0.25, brake: 0.5, steer: -1.0, buttons: button };
+        let mut arrival = arrival(1, 101, 100, 0.0);
+        arrival.frame.controls = controls;
+        drivers.hear(&arrival, now(101));
+        let mut commands = Vec::new();
+        drivers.drive(now(101), &mut commands);
+        assert_eq!(commands, [Command::Drive { slot: 1, controls: held }], "button {button}");
+    }
+}
