@@ -51,7 +51,8 @@ pub struct JoinRequest {
     /// Whether what it may take of cells is put on the key of its own snapshots, where it need not subscribe to any: over
     /// datagrams subscriptions get lost, and so does what takes them back.
     pub cells_along: bool,
-    /// The earlier session that is to go on, where it is not over yet; name and role stay what they were.
+    /// The earlier session that is to go on, where it is not over yet; name and role stay what they were, what it is sent is
+    /// as this request says.
     pub resume: Option<ResumeProof>,
 }
 

@@ -252,12 +252,11 @@ impl Answering {
         let mut sessions = self.shared.sessions();
         let key = secrets.key.clone();
         let now_ms = self.shared.clock.ms();
-        let joined = match &request.resume {
-            Some(proof) => sessions.resume(proof, request.cells_along, secrets, now_ms),
-            None => {
-                let JoinRequest { ref name, role, bytes_per_s, cells_along, .. } = request;
-                sessions.join(Wish { name, role, bytes_per_s, cells_along }, secrets, now_ms)
-            }
+        let JoinRequest { ref name, role, bytes_per_s, cells_along, ref resume } = request;
+        let wish = Wish { name, role, bytes_per_s, cells_along };
+        let joined = match resume {
+            Some(proof) => sessions.resume(proof, wish, secrets, now_ms),
+            None => sessions.join(wish, secrets, now_ms),
         };
         let id = joined.map_err(|refusal| match refusal {
             JoinRefusal::Full => Refusal::Full { slots: sessions.slots_of(request.role) },

@@ -127,7 +127,9 @@ impl Publishing {
                         self.begin_feed(id, bytes_per_s, cells_along);
                         self.begin_session(id, role, name);
                     }
-                    Change::Resumed { from, to, cells_along } => self.resume_session(from, to, cells_along),
+                    Change::Resumed { from, to, bytes_per_s, cells_along } => {
+                        self.resume_session(from, to, bytes_per_s, cells_along);
+                    }
                     Change::Said { slot, text } => self.add_event(Event::Said { slot, text }),
                     Change::Ended { id, role, reason } => self.end_session(id, role, reason),
                 }
@@ -172,14 +174,16 @@ impl Publishing {
         }
     }
 
-    /// The arena notices nothing: the car is there, or on its way.
-    fn resume_session(&mut self, from: SessionId, to: SessionId, cells_along: bool) {
+    /// The arena notices nothing: the car is there, or on its way. The client knows nothing any more, so that what it is sent
+    /// begins anew, and so does what it pays for.
+    fn resume_session(&mut self, from: SessionId, to: SessionId, bytes_per_s: u32, cells_along: bool) {
         let along = self.along(to.slot, cells_along).unwrap_or_else(|reason| {
             tracing::error!("no publisher of cells for slot {}: {reason}", to.slot);
             None
         });
         if let Some(feed) = self.feeds.get_mut(&to.slot) {
-            (feed.id, feed.along) = (to, along);
+            let own = OwnStream::new(*self.state.precision(), bytes_per_s, self.shared.tick_hz);
+            (feed.id, feed.along, feed.own) = (to, along, own);
         }
         // Whoever still waits for the earlier join waits for nothing.
         self.asker.tell(Work::Ended(from, EndReason::Resumed));

@@ -114,6 +114,8 @@ pub enum Change {
         from: SessionId,
         /// What it is from now on; the slot is the same.
         to: SessionId,
+        /// Its byte budget from now on.
+        bytes_per_s: u32,
         /// Whether cells come along with its own snapshots now.
         cells_along: bool,
     },
@@ -267,18 +269,19 @@ impl Sessions {
         wish.map_or(most, |wish| wish.clamp(LEAST_BYTES_PER_S.min(most), most))
     }
 
-    /// Lets a player's session go on that `proof` is for, whether its connection is known to be lost or not; its cells come
-    /// as `cells_along` says from then on.
+    /// Lets a player's session go on that `proof` is for, whether its connection is known to be lost or not. Name and role
+    /// stay; what it is sent, and how, is as `wish` says from then on.
     ///
     /// # Errors
     /// [`JoinRefusal::Over`], [`JoinRefusal::Closing`].
     pub fn resume(
         &mut self,
         proof: &ResumeProof,
-        cells_along: bool,
+        wish: Wish<'_>,
         secrets: Secrets,
         now_ms: u64,
     ) -> Result<SessionId, JoinRefusal> {
+        let (bytes_per_s, cells_along) = (self.bytes_per_s(wish.bytes_per_s), wish.cells_along);
         if self.closing {
             return Err(JoinRefusal::Closing);
         }
@@ -292,7 +295,7 @@ impl Sessions {
         (session.epoch, session.key, session.acknowledged) = (to.epoch, secrets.key, (0, 0));
         (session.heard_ms, session.away_since_ms, session.last_sequence) = (now_ms, None, 0);
         session.said_sequence = 0;
-        self.changes.push(Change::Resumed { from, to, cells_along });
+        self.changes.push(Change::Resumed { from, to, bytes_per_s, cells_along });
         Ok(to)
     }
 

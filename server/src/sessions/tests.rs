@@ -193,19 +193,20 @@ fn whoever_proves_it_resumes_once_in_the_same_slot_with_a_new_epoch_and_key() {
         |id: SessionId, key| ResumeProof { slot: id.slot, epoch: id.epoch, proof: seal::prove(id.slot, id.epoch, key) };
     let good = of(id, &SessionKey([77; 32]));
     let elsewhere = SessionId { slot: 1, ..id };
+    let wish = Wish { bytes_per_s: Some(9_000), cells_along: true, ..player("Nobody") };
     for bad in [
         of(id, &SessionKey([78; 32])),
         of(elsewhere, &SessionKey([77; 32])),
         of(SessionId { epoch: 76, ..id }, &SessionKey([77; 32])),
     ] {
-        assert_eq!(sessions.resume(&bad, true, secrets(5), 2000), Err(JoinRefusal::Over));
+        assert_eq!(sessions.resume(&bad, wish, secrets(5), 2000), Err(JoinRefusal::Over));
     }
     let to = SessionId { epoch: 78, ..id };
-    assert_eq!(sessions.resume(&good, true, secrets(78), 2000), Ok(to));
-    assert_eq!(sessions.resume(&good, true, secrets(79), 2000), Err(JoinRefusal::Over));
+    assert_eq!(sessions.resume(&good, wish, secrets(78), 2000), Ok(to));
+    assert_eq!(sessions.resume(&good, wish, secrets(79), 2000), Err(JoinRefusal::Over));
     assert_eq!(
         (sessions.count(), taken(&mut sessions)),
-        (1, vec![Change::Resumed { from: id, to, cells_along: true }])
+        (1, vec![Change::Resumed { from: id, to, bytes_per_s: 9_000, cells_along: true }])
     );
     // The old connection's words are too late, and the new one counts from 1.
     sessions.token_disappeared(id, 2001);
@@ -214,7 +215,7 @@ fn whoever_proves_it_resumes_once_in_the_same_slot_with_a_new_epoch_and_key() {
     sessions.expire(7002);
     assert_eq!((sessions.count(), sessions.key(to.slot)), (1, Some(&SessionKey([78; 32]))));
     // Also before anybody has noticed that the connection is gone.
-    assert!(sessions.resume(&of(to, &SessionKey([78; 32])), false, secrets(80), 7003).is_ok());
+    assert!(sessions.resume(&of(to, &SessionKey([78; 32])), wish, secrets(80), 7003).is_ok());
 }
 
 #[test]

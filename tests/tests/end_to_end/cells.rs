@@ -242,6 +242,34 @@ async fn a_fifth_of_everything_lost_heals() {
     server.stop().unwrap_or_else(|error| panic!("{error}"));
 }
 
+/// Over a connection that takes less a session goes on with what it asks for then.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn who_goes_on_with_less_is_sent_less() {
+    const BYTES_PER_S: u32 = 8_000;
+    const WATCHED: Duration = Duration::from_secs(3);
+    let (server, _observer) = start(&busy_field()).await;
+    let cut = connect(&server.endpoint, "cut").await;
+    let until = Instant::now() + WATCHED;
+    while Instant::now() < until {
+        next_snapshot(&cut).await;
+        cut.send(Default::default()).await.unwrap();
+    }
+    let full = cut.statistics().received_bytes;
+    let ticket = cut.resume_ticket();
+    drop(cut);
+    let resumed = Session::builder(&server.endpoint, "cut").resume(ticket).bytes_per_s(BYTES_PER_S);
+    let resumed = resumed.connect().await.unwrap();
+    let until = Instant::now() + WATCHED;
+    while Instant::now() < until {
+        next_snapshot(&resumed).await;
+        resumed.send(Default::default()).await.unwrap();
+    }
+    let least = resumed.leave().await.received_bytes;
+    let allowed = f64::from(BYTES_PER_S) * WATCHED.as_secs_f64() * 1.3;
+    assert!((least as f64) < allowed && full as f64 > allowed, "{full}, then {least} bytes of {allowed}");
+    server.stop().unwrap_or_else(|error| panic!("{error}"));
+}
+
 /// What the slow line takes, bytes/s: more than a session is always given, less than everything.
 const SLOW_BYTES_PER_S: u64 = 14_000;
 /// And that of one who subscribes to everything.
