@@ -3,7 +3,10 @@
 use std::time::Duration;
 
 use pita_protocol::{Message, WireError, message::Keyframes};
-use tokio::{sync::mpsc, time::timeout};
+use tokio::{
+    sync::mpsc,
+    time::{Instant, timeout, timeout_at},
+};
 use zenoh::{Config, query::Reply};
 
 use crate::error::ClientError;
@@ -15,6 +18,9 @@ const LEASE_MS: u32 = 5_000;
 /// Longest message that the transport collects before anybody looks at it, bytes: the longest of the protocol and room
 /// for the transport's own. Zenoh's default is 1 GiB.
 const MESSAGE_MAX: usize = Keyframes::MAX_BYTES + (64 << 10);
+
+/// Longer than anybody here waits for an answer Zenoh does: when its time is over it says so by an answer that cannot be read.
+const ZENOH_WAITS_LONGER: Duration = Duration::from_secs(10);
 
 /// Most answers to one question that are looked at.
 const ANSWERS_MAX: usize = 16;
@@ -104,7 +110,8 @@ pub async fn ask_all<M: Message>(
 ) -> Result<Vec<M>, ClientError> {
     let mut answers = pose(zenoh, key, Vec::new(), patience).await?;
     let mut read_so_far = Vec::new();
-    while let Ok(Some(reply)) = timeout(patience, answers.recv()).await {
+    let until = Instant::now() + patience;
+    while let Ok(Some(reply)) = timeout_at(until, answers.recv()).await {
         read_so_far.push(read(question, &reply)?);
     }
     Ok(read_so_far)
@@ -122,7 +129,7 @@ async fn pose(
     zenoh
         .get(key)
         .payload(payload)
-        .timeout(patience)
+        .timeout(patience + ZENOH_WAITS_LONGER)
         .callback(keep)
         .await
         .map_err(ClientError::transport("ask the server"))?;

@@ -125,6 +125,24 @@ async fn silence_and_absence_are_told_apart() {
     assert!(nobody.to_string().contains("cargo run --release"), "{nobody}");
 }
 
+/// Zenoh has a word of its own for that, which a client that is kept from a core meanwhile found before it saw that its
+/// patience was over.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_that_does_not_answer_in_time_is_not_said_to_answer_nonsense() {
+    let server = FakeServer::answering(Box::new(|_| {
+        std::thread::sleep(Duration::from_secs(5));
+        None
+    }))
+    .await;
+    let connecting = builder(&server).connect_timeout(Duration::from_secs(2)).connect();
+    let held_up = async {
+        tokio::time::sleep(Duration::from_secs(1)).await;
+        std::thread::sleep(Duration::from_secs(3));
+    };
+    let error = tokio::join!(connecting, held_up).0.unwrap_err();
+    assert!(matches!(&error, ClientError::NoArena { .. }) && error.is_worth_retrying(), "{error:?}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn bad_arguments_are_refused_before_anything_is_sent() {
     for endpoint in ["", "nonsense", "tcp/", "carrier-pigeon/1.2.3.4:5", "tcp/127.0.0.1:99999\", \"x"] {
