@@ -87,7 +87,7 @@ impl<const D: usize> BlockDescent<D> {
         order.clear();
         order.extend((0..n as u32).filter(|&i| {
             let [start, end] = [starts[i as usize], starts[i as usize + 1]];
-            end > start && terms[i as usize] == end - start
+            matches!(problem.unknowns[i as usize], Unknown::Body(_)) && end > start && terms[i as usize] == end - start
         }));
         let up = -problem.gravity.acceleration;
         let height = |i: u32| match &problem.unknowns[i as usize] {
