@@ -30,6 +30,9 @@ pub trait Coder {
 
     /// The same of at most 32 bits: the high [`FEW`] first, then the others.
     fn raw(&mut self, value: u32, count: u32) -> u32 {
+        if (1..=FEW).contains(&count) {
+            return self.few(value, count);
+        }
         let (mut read, mut left) = (0, count);
         while left > 0 {
             let part = left.min(FEW);
@@ -155,6 +158,11 @@ impl<'a> Decoder<'a> {
     #[inline]
     fn take(&mut self, (start, width): (u32, u32)) {
         self.state = u64::from(width) * (self.state >> BITS) + u64::from(self.slot() - start);
+        self.refill();
+    }
+
+    #[inline]
+    fn refill(&mut self) {
         if self.state < LEAST
             && let Some((word, rest)) = self.words.split_first_chunk()
         {
@@ -188,9 +196,10 @@ impl Coder for Decoder<'_> {
 
     #[inline]
     fn few(&mut self, _: u32, count: u32) -> u32 {
-        let bits = self.slot() >> (BITS - count);
-        self.take((bits << (BITS - count), WHOLE >> count));
-        bits
+        let (slot, rest) = (self.slot(), BITS - count);
+        self.state = (self.state >> BITS << rest) + u64::from(slot & ((1 << rest) - 1));
+        self.refill();
+        slot >> rest
     }
 
     fn is_finished(&self) -> bool {

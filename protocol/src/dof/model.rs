@@ -85,7 +85,7 @@ impl<const N: usize, const K: usize> Symbols<N, K> {
         for (start, target) in starts.iter_mut().zip(&Self::TARGETS[symbol]) {
             *start += (target - *start) >> slowness;
         }
-        *seen = (*seen + 1).min(SLOWNESS.len() as u8 - 1);
+        *seen += u8::from(usize::from(*seen) < SLOWNESS.len() - 1);
         symbol
     }
 }

@@ -12,7 +12,7 @@
 mod line;
 mod turn;
 
-use super::quantise::{Fineness, Group, Precision, Quantised};
+use super::quantise::{Group, Precision, Quantised};
 
 pub use line::Line;
 pub use turn::Turn;
@@ -23,7 +23,7 @@ const TRACK: usize = 0;
 const REST: usize = 1;
 
 /// Ticks that a prediction goes ahead at most.
-const AHEAD_MAX: i64 = 128;
+const AHEAD_MAX: u64 = 128;
 /// States that a track is fitted through at most; more would not follow what turns.
 const FITTED_MAX: u8 = 4;
 /// What a track through n states takes of a miss, of 2^8: as place, and as rate. n is 2, 3, 4. All of it is place where n is
@@ -45,17 +45,35 @@ static RECIPROCALS: [i64; AHEAD_MAX as usize + 1] = {
     table
 };
 
-/// Where a group's track leads in so many ticks.
-pub trait Track: Sized {
-    /// That of `state` in `ahead` ticks.
-    fn of(state: &GroupState, ahead: i64) -> Self;
+/// How far a prediction goes ahead.
+#[derive(Clone, Copy, Debug)]
+pub struct Ahead {
+    /// 1 to [`AHEAD_MAX`].
+    ticks: i64,
+    /// 2^16 over them.
+    reciprocal: i64,
+}
 
-    /// The value that it leads to.
-    fn expected(&self, state: &GroupState, fineness: &Fineness) -> Quantised;
+impl Ahead {
+    /// So many ticks, or the most that a prediction goes.
+    #[inline]
+    pub fn of(ticks: u64) -> Self {
+        let ticks = ticks.clamp(1, AHEAD_MAX);
+        Self { ticks: ticks as i64, reciprocal: RECIPROCALS[ticks as usize] }
+    }
+}
+
+/// Where a group's track leads in so many ticks.
+pub trait Track {
+    /// The state that is expected next, by the guess that was less wrong of late.
+    fn expected(&self, state: &GroupState) -> Quantised;
+
+    /// By how much a group moved from `old` to `new`, of 16 to a step.
+    fn moved(&self, old: &Quantised, new: &Quantised) -> u64;
 
     /// Fits the track of `state`, which is at its new value, to where it led; `old` was the value before. Answers by how much
     /// it missed, of 16 to a step.
-    fn fit(&self, state: &mut GroupState, old: &Quantised, fineness: &Fineness) -> u64;
+    fn fit(&self, state: &mut GroupState, old: &Quantised) -> u64;
 }
 
 /// A group at a tick, with what prediction needs to go on from there.
@@ -106,18 +124,11 @@ impl GroupState {
         self.fitted == 0
     }
 
-    /// The state that is expected next, by the guess that was less wrong of late.
-    #[inline]
-    pub fn expected(&self, track: &impl Track, fineness: &Fineness) -> Quantised {
-        if self.goes_by_rest() { self.value } else { track.expected(self, fineness) }
-    }
-
     /// Goes on to `value`, which was expected where `track` led.
-    #[inline]
-    pub fn follow(&mut self, track: &impl Track, value: Quantised, fineness: &Fineness) {
+    #[inline(always)]
+    pub fn follow(&mut self, track: &impl Track, value: Quantised) {
         let (was_calm, old) = (self.is_calm(), std::mem::replace(&mut self.value, value));
-        let moved: u64 = value.minus(&old, fineness).iter().map(|step| u64::from(step.unsigned_abs())).sum();
-        let moved = if value.largest == old.largest { moved * u64::from(STEP_ERROR) } else { ERROR_MAX };
+        let moved = track.moved(&old, &value);
         self.errors[REST] = learnt(self.errors[REST], moved);
         if moved == 0 && (was_calm || self.errors[REST] == 0) {
             self.fitted = 0;
@@ -125,7 +136,7 @@ impl GroupState {
             (self.place, self.rate) = ([0; 4], [0; 4]);
             return;
         }
-        let wrong = track.fit(self, &old, fineness);
+        let wrong = track.fit(self, &old);
         self.errors[TRACK] = learnt(self.errors[TRACK], wrong);
     }
 
@@ -134,14 +145,12 @@ impl GroupState {
         self.errors[TRACK] > self.errors[REST]
     }
 
-    /// Shares of a `miss` in `ahead` ticks: as place, of 2^8, and as rate, of 2^16. Who misses by more than one and a half
-    /// times `step` begins a new track.
+    /// Shares of what a track missed by: as place, of 2^8, and as rate, of 2^16. A track that missed by `far` begins anew.
     #[inline]
-    fn shares(&mut self, miss: [i64; 3], step: i64, ahead: i64) -> (i64, i64) {
-        let worst = miss.iter().map(|m| m.abs()).max().unwrap_or(0);
-        self.fitted = if 2 * worst > 3 * step { 2 } else { (self.fitted + 1).clamp(2, FITTED_MAX) };
+    fn shares(&mut self, far: bool, ahead: Ahead) -> (i64, i64) {
+        self.fitted = if far { 2 } else { (self.fitted + 1).clamp(2, FITTED_MAX) };
         let (place, rate) = SHARES[usize::from(self.fitted) - 2];
-        (place, (rate * RECIPROCALS[ahead as usize]) >> 8)
+        (place, (rate * ahead.reciprocal) >> 8)
     }
 }
 

@@ -201,12 +201,26 @@ impl Quantised {
     /// [`WireError::Content`] for what no state has.
     #[inline]
     pub(super) fn check(&self, fineness: &Fineness) -> Result<(), WireError> {
-        require(self.steps.iter().all(|s| s.unsigned_abs() <= STEPS_MAX as u32), "steps", "at most 2^26 in size")?;
-        let square: u64 = self.steps.iter().map(|&s| u64::from(s.unsigned_abs()).pow(2)).sum();
-        let is_unit = self.group != Group::Rotation || square <= fineness.square;
-        require(is_unit, "steps of a rotation", "at most a unit quaternion's")?;
-        let angle = self.steps[2];
-        require(angle == within(angle, fineness.beyond(self.group)), "angle of a hinge", "at most half a turn")
+        self.check_size()?;
+        match self.group {
+            Group::Rotation => {
+                let square: u64 = self.steps.iter().map(|&s| u64::from(s.unsigned_abs()).pow(2)).sum();
+                require(square <= fineness.square, "steps of a rotation", "at most a unit quaternion's")
+            }
+            Group::Hinge => {
+                let angle = self.steps[2];
+                require(angle == within(angle, fineness.beyond_turn), "angle of a hinge", "at most half a turn")
+            }
+            Group::Point | Group::Scalar | Group::Rate => Ok(()),
+        }
+    }
+
+    /// # Errors
+    /// [`WireError::Content`] for more steps than any state has.
+    #[inline]
+    pub(super) fn check_size(&self) -> Result<(), WireError> {
+        let fits = self.steps.iter().all(|steps| (-STEPS_MAX..=STEPS_MAX).contains(steps));
+        require(fits, "steps", "at most 2^26 in size")
     }
 
     /// The rotation's components of 2^30; see [`ONE`].

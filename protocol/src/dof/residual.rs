@@ -6,8 +6,8 @@
 
 use super::ans::Coder;
 use super::model::{Bit, Symbols};
-use super::predict::{GroupState, Line, Track, Turn};
-use super::quantise::{Fineness, Group, Quantised, others, within};
+use super::predict::{Ahead, GroupState, Line, Track, Turn};
+use super::quantise::{Fineness, Group, Quantised, others};
 use crate::{WireError, codec::require};
 
 const GROUPS: usize = Group::ALL.len();
@@ -19,15 +19,32 @@ const NEAR: usize = 3;
 const PATTERNS: usize = 27;
 /// Patterns of groups, by their kind.
 const PATTERNS_OF: [usize; GROUPS] = [27, 27, 3, 27, 27];
-/// The classes of a pattern's components: 0, 1, or 2 and more steps.
-const CLASSES: [[u32; 3]; PATTERNS] = {
-    let mut classes = [[0; 3]; PATTERNS];
+
+/// What a pattern says.
+#[derive(Clone, Copy)]
+struct Pattern {
+    /// 0, 1, or 2 and more steps, by component.
+    sizes: [u32; 3],
+    /// How many components are off: each of them has a sign.
+    signs: u32,
+    /// By how many bits the signs have to go left for that of a component to come to bit 31. Where it has none, whichever
+    /// bit comes there: no steps are none either way.
+    to_sign: [u32; 3],
+}
+
+/// By pattern.
+static PATTERN: [Pattern; PATTERNS] = {
+    let mut patterns = [Pattern { sizes: [0; 3], signs: 0, to_sign: [31; 3] }; PATTERNS];
     let mut i = 0;
-    while i < PATTERNS {
-        classes[i] = [i as u32 % 3, i as u32 / 3 % 3, i as u32 / 9];
+    while i < 3 * PATTERNS {
+        let (pattern, component) = (&mut patterns[i / 3], i % 3);
+        let size = i / 3 / [1, 3, 9][component] % 3;
+        pattern.sizes[component] = size as u32;
+        pattern.to_sign[component] = 31 - pattern.signs;
+        pattern.signs += (size > 0) as u32;
         i += 1;
     }
-    classes
+    patterns
 };
 /// A group's first symbol: a pattern, or, from [`PATTERNS`] on, which other component of a rotation is left out.
 type First = Symbols<32, { GROUPS * ERRORS * NEAR }>;
@@ -57,9 +74,9 @@ pub struct Models {
 /// What is known of a group that goes on, beside its state.
 pub struct Next<'a> {
     /// Ticks since that.
-    pub ahead: i64,
-    /// Size of the residual of its body's last group, steps; `None` for the first.
-    pub sibling: Option<u32>,
+    pub ahead: Ahead,
+    /// 0 for a body's first group; 1 where the one before was as expected, 2 where it was not.
+    pub near: usize,
     /// What an encoder has; `None` when decoding.
     pub value: Option<&'a Quantised>,
     /// How fine rotations are.
@@ -104,7 +121,7 @@ impl Models {
     ///
     /// # Errors
     /// [`WireError::Content`] for a number that no state has.
-    #[inline]
+    #[inline(always)]
     pub fn group<C: Coder>(
         &mut self,
         coder: &mut C,
@@ -114,93 +131,117 @@ impl Models {
         if state.value.group == Group::Rotation {
             return self.rotation(coder, state, next);
         }
-        let track = Line::of(state, next.ahead);
-        let mut expected = state.expected(&track, next.fineness);
-        let pattern = self.first(coder, state, next, &expected);
-        let size = self.residual(coder, state, next, pattern, &mut expected)?;
-        state.follow(&track, expected, next.fineness);
+        self.line(coder, state, next)
+    }
+
+    #[inline(never)]
+    fn line<C: Coder>(&mut self, coder: &mut C, state: &mut GroupState, next: &Next<'_>) -> Result<u32, WireError> {
+        let track = Line::of(state, next.ahead, next.fineness);
+        let mut expected = track.expected(state);
+        let error = error_bucket(state.expected_error());
+        let pattern = self.first(coder, next, error, &expected);
+        let mut size = 0;
+        if pattern > 0 {
+            size = self.residual(coder, next, error, pattern, &mut expected)?;
+            track.bound(&mut expected)?;
+        }
+        state.follow(&track, expected);
         Ok(size)
     }
 
     /// The same of a rotation, whose first symbol may say that another component is left out.
-    #[inline]
+    #[inline(never)]
     fn rotation<C: Coder>(&mut self, coder: &mut C, state: &mut GroupState, next: &Next<'_>) -> Result<u32, WireError> {
-        let track = Turn::of(state, next.ahead);
-        let mut expected = state.expected(&track, next.fineness);
-        let mut first = self.first(coder, state, next, &expected);
+        let track = Turn::of(state, next.ahead, next.fineness);
+        let mut expected = track.expected(state);
+        let error = error_bucket(state.expected_error());
+        let mut first = self.first(coder, next, error, &expected);
         if first >= PATTERNS {
             let others = others(expected.largest.into());
             require(first < PATTERNS + others.len(), "first symbol", "at most 29")?;
-            expected = track.expected_without(others[first - PATTERNS], state, next.fineness);
-            first = self.first(coder, state, next, &expected);
+            expected = track.expected_without(others[first - PATTERNS], state);
+            first = self.first(coder, next, error, &expected);
         }
-        let size = self.residual(coder, state, next, first, &mut expected)?;
-        state.follow(&track, expected, next.fineness);
+        let mut size = 0;
+        if first > 0 {
+            size = self.residual(coder, next, error, first, &mut expected)?;
+            expected.check(next.fineness)?;
+        }
+        state.follow(&track, expected);
         Ok(size)
     }
 
+    /// Codes the first symbol of a group whose guess was wrong by `error` of late.
     #[inline]
-    fn first<C: Coder>(&mut self, coder: &mut C, state: &GroupState, next: &Next<'_>, expected: &Quantised) -> usize {
-        let error = error_bucket(state.expected_error()).min(ERRORS - 1);
-        let near = next.sibling.map_or(0, |size| 1 + usize::from(size > 0));
-        let context = (state.value.group as usize * ERRORS + error) * NEAR + near;
-        self.first.code(coder, context, first_symbol(expected, next.value, next.fineness))
+    fn first<C: Coder>(&mut self, coder: &mut C, next: &Next<'_>, error: usize, expected: &Quantised) -> usize {
+        let context = (expected.group as usize * ERRORS + error.min(ERRORS - 1)) * NEAR + next.near;
+        let value = next.value.filter(|_| C::WRITES);
+        self.first.code(coder, context, value.map_or(0, |value| first_symbol(expected, value, next.fineness)))
     }
 
     /// Adds to what was expected by how much it is off, by `pattern`: sizes, then signs. Answers the sum of sizes.
-    #[inline]
+    #[inline(always)]
     fn residual<C: Coder>(
         &mut self,
         coder: &mut C,
-        state: &GroupState,
         next: &Next<'_>,
+        error: usize,
         pattern: usize,
         expected: &mut Quantised,
     ) -> Result<u32, WireError> {
-        if pattern == 0 {
-            return Ok(0);
-        }
         let kind = expected.group as usize;
         require(pattern < PATTERNS_OF[kind], "first symbol", "a pattern of the group's components")?;
-        let context = kind * FAR_ERRORS + error_bucket(state.expected_error()).min(FAR_ERRORS - 1);
-        let residual = next.value.map_or([0; 3], |value| value.minus(expected, next.fineness));
-        let mut sizes = CLASSES[pattern];
+        let context = kind * FAR_ERRORS + error.min(FAR_ERRORS - 1);
+        let value = next.value.filter(|_| C::WRITES);
+        let residual = value.map_or([0; 3], |value| value.minus(expected, next.fineness));
+        let pattern = &PATTERN[pattern];
+        let mut sizes = pattern.sizes;
         for (size, residual) in sizes.iter_mut().zip(residual) {
             if *size > 1 {
                 *size = self.size(coder, context, residual.unsigned_abs());
             }
         }
-        let off = sizes.map(|size| u32::from(size > 0));
-        let [a, b, c] = [0, 1, 2].map(|i| u32::from(residual[i] < 0) & off[i]);
-        let mut signs = coder.few(a | (b | c << off[1]) << off[0], off[0] + off[1] + off[2]);
+        let sign = |i: usize| u32::from(residual[i] < 0 && sizes[i] > 0) << (31 - pattern.to_sign[i]);
+        let signs = coder.few(sign(0) | sign(1) | sign(2), pattern.signs);
         for (i, step) in expected.steps.iter_mut().enumerate() {
-            let size = sizes[i] as i32;
-            *step += if signs & off[i] == 1 { -size } else { size };
-            signs >>= off[i];
+            let sign = (signs << pattern.to_sign[i]) as i32 >> 31;
+            *step += (sizes[i] as i32 ^ sign) - sign;
         }
-        expected.steps[2] = within(expected.steps[2], next.fineness.beyond(expected.group));
-        expected.check(next.fineness)?;
         Ok(sizes.iter().sum())
     }
 
     /// Codes a size of at least 2.
-    fn size(&mut self, coder: &mut impl Coder, context: usize, size: u32) -> u32 {
-        let more = size.saturating_sub(2);
-        let far = more.saturating_sub(OWN_SYMBOL) + 2;
-        let own = OWN_SYMBOL as usize;
-        let symbol = if more < OWN_SYMBOL { more as usize } else { (own - 1 + far.ilog2() as usize).min(FAR) };
+    #[inline]
+    fn size<C: Coder>(&mut self, coder: &mut C, context: usize, size: u32) -> u32 {
+        let symbol = if C::WRITES { size_symbol(size) } else { 0 };
         let symbol = self.rest.code(coder, context, symbol);
-        if symbol < own {
-            return symbol as u32 + 2;
-        }
-        let mut bits = (symbol + 1 - own) as u32;
-        if symbol == FAR {
-            // Of at most 2^27 steps, which is more than two states can be apart.
-            bits = coder.raw(far.ilog2(), 5).clamp(1, 27);
-        }
-        let low = coder.raw(far.wrapping_sub(1 << bits.min(far.ilog2())), bits);
-        (1 << bits) + low + OWN_SYMBOL
+        if symbol < OWN_SYMBOL as usize { symbol as u32 + 2 } else { far_size(coder, symbol, size) }
     }
+}
+
+/// The symbol of a size of at least 2.
+fn size_symbol(size: u32) -> usize {
+    let more = size.saturating_sub(2);
+    let bits = far(size).ilog2() as usize;
+    if more < OWN_SYMBOL { more as usize } else { (OWN_SYMBOL as usize - 1 + bits).min(FAR) }
+}
+
+/// What is coded of a size that has no symbol of its own: a number of at least 2.
+fn far(size: u32) -> u32 {
+    size.saturating_sub(2 + OWN_SYMBOL) + 2
+}
+
+/// Codes a size that has no symbol of its own.
+#[inline(never)]
+fn far_size(coder: &mut impl Coder, symbol: usize, size: u32) -> u32 {
+    let far = far(size);
+    let mut bits = (symbol + 1) as u32 - OWN_SYMBOL;
+    if symbol == FAR {
+        // Of at most 2^27 steps, which is more than two states can be apart.
+        bits = coder.raw(far.ilog2(), 5).clamp(1, 27);
+    }
+    let low = coder.raw(far.wrapping_sub(1 << bits.min(far.ilog2())), bits);
+    (1 << bits) + low + OWN_SYMBOL
 }
 
 impl Default for Models {
@@ -210,8 +251,7 @@ impl Default for Models {
 }
 
 /// What an encoder's `value` is in the first symbol.
-fn first_symbol(expected: &Quantised, value: Option<&Quantised>, fineness: &Fineness) -> usize {
-    let Some(value) = value else { return 0 };
+fn first_symbol(expected: &Quantised, value: &Quantised, fineness: &Fineness) -> usize {
     if value.largest != expected.largest {
         let other = others(expected.largest.into()).into_iter().position(|other| other == usize::from(value.largest));
         return PATTERNS + other.unwrap_or(0);
@@ -222,8 +262,9 @@ fn first_symbol(expected: &Quantised, value: Option<&Quantised>, fineness: &Fine
 
 /// Buckets, two to an octave from a quarter of a step on.
 fn error_bucket(error: u16) -> usize {
-    let x = usize::from(error);
-    if x < 4 { x / 2 } else { (2 * x.ilog2() as usize + (x >> (x.ilog2() - 1) & 1)) - 2 }
+    let halves = usize::from(error / 2);
+    let octave = (halves | 2).ilog2();
+    2 * octave as usize + (halves >> (octave - 1)) - 2
 }
 
 /// 0, 1, 2 and more.

@@ -3,7 +3,7 @@
 use super::ans::Coder;
 use super::budget::Spent;
 use super::frame::{BODIES_MAX, BODY_GROUPS_MAX, Body, Frame, GROUPS_MAX, State};
-use super::predict::GroupState;
+use super::predict::{Ahead, GroupState};
 use super::quantise::{Fineness, Group, Quantised};
 use super::residual::{Models, Next};
 use crate::{WireError, codec::require};
@@ -206,7 +206,7 @@ impl<'a, C: Coder> Walk<'a, C> {
             if self.partial && !models.flag(self.coder, flag::SENT, source.is_some_and(|(sent, _)| sent)) {
                 continue;
             }
-            let ahead = (*tick - *told) as i64;
+            let ahead = Ahead::of(*tick - *told);
             *told = *tick;
             let states = &mut groups[body.start as usize..][..body.groups.into()];
             let now = source.map(|(_, now)| now);
@@ -232,7 +232,7 @@ impl<'a, C: Coder> Walk<'a, C> {
         &mut self,
         models: &mut Models,
         states: &mut [GroupState],
-        ahead: i64,
+        ahead: Ahead,
         neighbour: u32,
         now: Option<&[Quantised]>,
         fineness: &Fineness,
@@ -244,11 +244,12 @@ impl<'a, C: Coder> Walk<'a, C> {
             }
         }
         let (mut moved, mut changed, written) = (0, 0, self.coder.written());
-        let mut sibling = None;
+        let mut next = Next { ahead, near: 0, value: None, fineness };
         for (i, state) in states.iter_mut().enumerate() {
-            let (old, value) = (state.value, now.map(|now| &now[i]));
-            let size = models.group(self.coder, state, &Next { ahead, sibling, value, fineness })?;
-            sibling = Some(size);
+            let old = state.value;
+            next.value = now.map(|now| &now[i]);
+            let size = models.group(self.coder, state, &next)?;
+            next.near = 1 + usize::from(size > 0);
             moved += size;
             changed += usize::from(C::WRITES && state.value != old);
         }

@@ -2,48 +2,59 @@
 
 use super::super::quantise::{Fineness, Group, Quantised, others};
 use super::super::quaternion::{ONE, Quaternion};
-use super::{AHEAD_MAX, GroupState, Track};
+use super::{Ahead, ERROR_MAX, GroupState, STEP_ERROR, Track};
 
 /// Misses from this on, of 2^30, are not small: a track begins anew at its value.
 const SMALL_MISS: u64 = 1 << 24;
 
 /// Where a rotation's track leads.
 #[derive(Clone, Copy, Debug)]
-pub struct Turn {
+pub struct Turn<'a> {
     /// `None` without a track.
     place: Option<Quaternion>,
-    ahead: i64,
+    ahead: Ahead,
+    fineness: &'a Fineness,
 }
 
-impl Turn {
+impl<'a> Turn<'a> {
+    /// That of `state`.
+    #[inline]
+    pub fn of(state: &GroupState, ahead: Ahead, fineness: &'a Fineness) -> Self {
+        let place = (!state.is_calm()).then(|| {
+            let turn = Quaternion(state.rate.map(i64::from)).power(ahead.ticks as u32);
+            turn.times(Quaternion(state.place.map(i64::from)))
+        });
+        Self { place, ahead, fineness }
+    }
+
     /// What is [expected](GroupState::expected) of a rotation that leaves out its component `largest`.
     #[inline(never)]
-    pub fn expected_without(&self, largest: usize, state: &GroupState, fineness: &Fineness) -> Quantised {
+    pub fn expected_without(&self, largest: usize, state: &GroupState) -> Quantised {
         match &self.place {
-            Some(place) if !state.goes_by_rest() => rounded(place, largest, fineness),
+            Some(place) if !state.goes_by_rest() => rounded(place, largest, self.fineness),
             _ if largest == usize::from(state.value.largest) => state.value,
-            _ => rounded(&Quaternion(state.value.components(fineness)), largest, fineness),
+            _ => rounded(&Quaternion(state.value.components(self.fineness)), largest, self.fineness),
         }
     }
 }
 
-impl Track for Turn {
+impl Track for Turn<'_> {
     #[inline]
-    fn of(state: &GroupState, ahead: i64) -> Self {
-        let ahead = ahead.clamp(1, AHEAD_MAX);
-        let place = (!state.is_calm()).then(|| {
-            let turn = Quaternion(state.rate.map(i64::from)).power(ahead as u32);
-            turn.times(Quaternion(state.place.map(i64::from)))
-        });
-        Self { place, ahead }
+    fn expected(&self, state: &GroupState) -> Quantised {
+        match &self.place {
+            Some(place) if !state.goes_by_rest() => rounded(place, place.largest(), self.fineness),
+            _ => state.value,
+        }
     }
 
     #[inline]
-    fn expected(&self, state: &GroupState, fineness: &Fineness) -> Quantised {
-        self.place.map_or(state.value, |place| rounded(&place, place.largest(), fineness))
+    fn moved(&self, old: &Quantised, new: &Quantised) -> u64 {
+        let steps: u64 = new.minus(old, self.fineness).iter().map(|step| u64::from(step.unsigned_abs())).sum();
+        if new.largest == old.largest { steps * u64::from(STEP_ERROR) } else { ERROR_MAX }
     }
 
-    fn fit(&self, state: &mut GroupState, old: &Quantised, fineness: &Fineness) -> u64 {
+    fn fit(&self, state: &mut GroupState, old: &Quantised) -> u64 {
+        let fineness = self.fineness;
         let (track, turn) = match self.place {
             Some(place) => (place, Quaternion(state.rate.map(i64::from))),
             None => (Quaternion(old.components(fineness)), Quaternion::NONE),
@@ -52,7 +63,9 @@ impl Track for Turn {
         // Half the angle, of 2^30, which is as far as components move.
         let miss = now.times(track.conjugate()).upright().axis();
         let wrong = (miss.iter().map(|miss| miss.unsigned_abs()).sum::<u64>() * fineness.steps as u64) >> (30 - 4);
-        let (place, rate) = state.shares(miss, fineness.step, self.ahead);
+        // A step and a half.
+        let far = miss.iter().any(|miss| 2 * miss.abs() > 3 * fineness.step);
+        let (place, rate) = state.shares(far, self.ahead);
         let bits = miss.iter().fold(0, |bits, m| bits | m.unsigned_abs());
         let (place, miss) = match bits < SMALL_MISS {
             true => (Quaternion::small(miss.map(|m| (place * m) >> 8)).times(track), miss),

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::super::predict::{Line, Track, Turn};
+use super::super::predict::{Ahead, Line, Turn};
 use super::*;
 
 const PRECISION: Precision = Precision { point: 1, rotation: 64, scalar: 1, rate: 1 };
@@ -17,8 +17,8 @@ fn group(group: Group, largest: u8, [before, now]: [[i32; 3]; 2]) -> Option<Grou
     let (before, now) = (value(before)?, value(now)?);
     let mut state = GroupState::first(before);
     match group {
-        Group::Rotation => state.follow(&Turn::of(&state, 1), now, &fineness),
-        _ => state.follow(&Line::of(&state, 1), now, &fineness),
+        Group::Rotation => state.follow(&Turn::of(&state, Ahead::of(1), &fineness), now),
+        _ => state.follow(&Line::of(&state, Ahead::of(1), &fineness), now),
     }
     Some(state)
 }
