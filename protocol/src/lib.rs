@@ -15,6 +15,8 @@ pub mod codec;
 pub mod description;
 pub mod dof;
 #[cfg(test)]
+mod golden;
+#[cfg(test)]
 mod hostile;
 pub mod input;
 pub mod keys;
