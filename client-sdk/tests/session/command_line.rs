@@ -85,6 +85,31 @@ async fn a_good_run_succeeds_and_prints_its_figures() {
     }
 }
 
+/// Everything that a bad network can do, on a command line: what is lost is missed, what comes twice is stale, what a freeze
+/// holds up comes late, and nothing of it ends a session.
+#[tokio::test(flavor = "multi_thread")]
+async fn bots_drive_over_every_kind_of_a_bad_network() {
+    let server = Arc::new(FakeServer::start().await);
+    let world = run_world(Arc::clone(&server), 1, 0.3);
+    let conditions =
+        "latency=40,jitter=10,loss=10,duplicate=20,reorder=20,up.rate=20000,down.rate=100000,freeze=2/0.3,seed=7";
+    let bots = start(&server.endpoint, &["--count", "1", "--seconds", "5", "--conditioner", conditions]);
+    let output = finish(bots).await;
+    world.abort();
+    assert!(output.status.success(), "{}", said(&output));
+    let all = &figures(&output)["scripts"]["all"];
+    assert_eq!((&all["bots_lost"], &all["malformed"]), (&0.into(), &0.into()), "{all}");
+    for (key, least) in [
+        ("distance_min_m", 3.0),
+        ("snapshots_received", 30.0),
+        ("snapshots_missed", 3.0),
+        ("snapshots_stale", 3.0),
+        ("jitter_p99_ms", 100.0),
+    ] {
+        assert!(all[key].as_f64().is_some_and(|figure| figure >= least), "{key}: {all}");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn cars_that_stand_still_fail_the_run() {
     let server = Arc::new(FakeServer::start().await);
