@@ -9,6 +9,12 @@ use std::collections::BinaryHeap;
 /// The islands of a tick.
 #[derive(Default)]
 pub(crate) struct Islands {
+    /// Number of bodies.
+    bodies: usize,
+    /// What potentials couple, in the order in which it was told; a body and itself where one acts on that alone.
+    told: Vec<(u32, u32)>,
+    /// Both when the islands were sorted last: most ticks couple what the last one did.
+    sorted: (usize, Vec<(u32, u32)>),
     /// Union-find forest over bodies.
     parent: Vec<u32>,
     coupled: Vec<bool>,
@@ -36,24 +42,18 @@ impl Islands {
 
     /// Starts a tick with `bodies` bodies.
     pub fn begin(&mut self, bodies: usize) {
-        self.parent.clear();
-        self.parent.extend(0..bodies as u32);
-        self.coupled.clear();
-        self.coupled.resize(bodies, false);
-        self.couplings.clear();
+        self.bodies = bodies;
+        self.told.clear();
     }
 
     /// A potential acts on `a` alone.
     pub fn touch(&mut self, a: u32) {
-        self.coupled[a as usize] = true;
+        self.told.push((a, a));
     }
 
     /// A potential acts between `a` and `b`.
     pub fn couple(&mut self, a: u32, b: u32) {
-        self.touch(a);
-        self.touch(b);
-        self.couplings.push((a.min(b), a.max(b)));
-        self.unite(a, b);
+        self.told.push((a.min(b), a.max(b)));
     }
 
     fn unite(&mut self, a: u32, b: u32) {
@@ -64,6 +64,28 @@ impl Islands {
 
     /// Sorts bodies into islands.
     pub fn finish(&mut self) {
+        let (bodies, told) = &mut self.sorted;
+        if self.starts.is_empty() || *bodies != self.bodies || *told != self.told {
+            *bodies = self.bodies;
+            told.clone_from(&self.told);
+            self.sort();
+        }
+    }
+
+    fn sort(&mut self) {
+        self.parent.clear();
+        self.parent.extend(0..self.bodies as u32);
+        self.coupled.clear();
+        self.coupled.resize(self.bodies, false);
+        self.couplings.clear();
+        for i in 0..self.told.len() {
+            let (a, b) = self.told[i];
+            (self.coupled[a as usize], self.coupled[b as usize]) = (true, true);
+            if a != b {
+                self.couplings.push((a, b));
+                self.unite(a, b);
+            }
+        }
         self.couplings.sort_unstable();
         self.couplings.dedup();
         self.order_elimination();

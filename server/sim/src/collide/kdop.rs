@@ -81,6 +81,18 @@ const fn joined<const H: usize>(sets: &[&[DVec3]]) -> [DVec3; H] {
     all
 }
 
+/// The lesser of two numbers, by a comparison: `f64::min` would have to look for NaN, and does not vectorise.
+#[inline]
+pub(super) fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers; see [`lesser`].
+#[inline]
+pub(super) fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
 /// A k-DOP of `H` = k/2 slabs: the points x with min\[i\] ≤ axis\[i\] · x ≤ max\[i\], m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kdop<const H: usize> {
@@ -97,10 +109,10 @@ impl<const H: usize> Kdop<H> {
     /// What contains both.
     #[inline]
     pub fn union(&self, other: &Self) -> Self {
-        // Comparisons instead of `f64::min`, which would have to look for NaN, and does not vectorise.
-        let lesser = |i: usize| if self.min[i] < other.min[i] { self.min[i] } else { other.min[i] };
-        let greater = |i: usize| if self.max[i] > other.max[i] { self.max[i] } else { other.max[i] };
-        Self { min: std::array::from_fn(lesser), max: std::array::from_fn(greater) }
+        Self {
+            min: std::array::from_fn(|i| lesser(self.min[i], other.min[i])),
+            max: std::array::from_fn(|i| greater(self.max[i], other.max[i])),
+        }
     }
 
     /// Whether no slab tells the two apart.
@@ -154,7 +166,11 @@ where
     #[inline]
     pub fn along(v: DVec3) -> [f64; H] {
         let [x, y, z] = Self::COLUMNS;
-        std::array::from_fn(|i| x[i] * v.x + y[i] * v.y + z[i] * v.z)
+        let mut along = [0.0; H];
+        for i in 0..H {
+            along[i] = x[i] * v.x + y[i] * v.y + z[i] * v.z;
+        }
+        along
     }
 
     /// The bound of points, deforming or not.
@@ -163,8 +179,8 @@ where
         for point in points {
             for (i, axis) in Self::AXES.iter().enumerate() {
                 let x = axis.dot(point);
-                bound.min[i] = if x < bound.min[i] { x } else { bound.min[i] };
-                bound.max[i] = if x > bound.max[i] { x } else { bound.max[i] };
+                bound.min[i] = lesser(x, bound.min[i]);
+                bound.max[i] = greater(x, bound.max[i]);
             }
         }
         bound
@@ -175,8 +191,8 @@ where
     pub fn swept(&self, displacement: DVec3) -> Self {
         let (mut swept, way) = (*self, Self::along(displacement));
         for (i, way) in way.into_iter().enumerate() {
-            swept.min[i] += way.min(0.0);
-            swept.max[i] += way.max(0.0);
+            swept.min[i] += lesser(way, 0.0);
+            swept.max[i] += greater(way, 0.0);
         }
         swept
     }

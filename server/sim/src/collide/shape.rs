@@ -134,8 +134,11 @@ impl Shape {
             Self::HalfSpace { .. } => [f64::INFINITY; H],
             Self::Ball { radius } => [*radius; H],
             Self::Box { half } => {
-                let [x, y, z] = DVec3::AXES.map(&along);
-                std::array::from_fn(|i| x[i].abs() * half.x + y[i].abs() * half.y + z[i].abs() * half.z)
+                let (mut x, y, z) = (along(DVec3::X), along(DVec3::Y), along(DVec3::Z));
+                for i in 0..H {
+                    x[i] = x[i].abs() * half.x + y[i].abs() * half.y + z[i].abs() * half.z;
+                }
+                x
             }
             Self::Capsule { half_length, radius } => along(DVec3::X).map(|x| x.abs() * half_length + radius),
             Self::Cylinder { half_length, radius, rounding } => along(DVec3::Z).map(|along| {

@@ -77,30 +77,22 @@ pub(crate) fn product_sub<const D: usize>(a: &Block<D>, b: &Block<D>, c: &mut Bl
 /// them later is multiplied. The strict upper triangle is zero. `None` where a pivot is not above `floor` times its diagonal
 /// entry.
 pub(crate) fn cholesky<const D: usize>(a: &Block<D>, floor: f64) -> Option<Block<D>> {
-    // Row by row of Lᵀ, in what is left of A: neighbours in memory are worked on together.
-    let mut upper = transpose(a);
-    let mut reciprocals = [0.0; D];
-    for j in 0..D {
-        let mut row = upper[j];
-        for above in &upper[..j] {
-            let factor = above[j];
-            for i in 0..D {
-                row[i] -= above[i] * factor;
-            }
+    let mut l: Block<D> = zero();
+    for i in 0..D {
+        let (above, rest) = l.split_at_mut(i);
+        let row = &mut rest[0];
+        for (j, other) in above.iter().enumerate() {
+            let left = row[..j].iter().zip(other).fold(a[i][j], |left, (x, y)| left - x * y);
+            row[j] = left * other[j];
         }
-        let pivot = row[j];
-        let positive = pivot > floor * a[j][j] && a[j][j] > 0.0;
+        let pivot = row[..i].iter().fold(a[i][i], |left, x| left - x * x);
+        let positive = pivot > floor * a[i][i] && a[i][i] > 0.0;
         if !positive {
             return None;
         }
-        reciprocals[j] = pivot.sqrt().recip();
-        for i in 0..D {
-            upper[j][i] = if i < j { 0.0 } else { row[i] * reciprocals[j] };
-        }
+        row[i] = pivot.sqrt().recip();
     }
-    let mut lower = transpose(&upper);
-    (0..D).for_each(|i| lower[i][i] = reciprocals[i]);
-    Some(lower)
+    Some(l)
 }
 
 /// X ← X L⁻ᵀ, L a factor from [`cholesky`]: every row of X is a right-hand side.

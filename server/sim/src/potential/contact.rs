@@ -311,6 +311,10 @@ impl ContactTerm {
     /// Energy and gradient on both frames.
     #[inline(always)]
     fn pushes<S: Scalar>(&self, displacement: Vec3<S>, normal: (S, S)) -> (S, [Wrench<S>; 2]) {
+        let is_open = normal.1.value() == 0.0 && self.limit <= 0.0;
+        if is_open {
+            return (S::ZERO, [Wrench::ZERO; 2]);
+        }
         let (energy, force) = self.force(displacement, normal);
         // Nobody asks for what acts on the world.
         let on_b = if self.on_world() { Wrench::ZERO } else { Wrench::at_fixed(force, self.arms[1]) };
