@@ -198,6 +198,11 @@ impl Pose {
         self.position + self.rotation * local
     }
 
+    /// The frame of a body that is there and moves with `twist`.
+    pub fn frame(self, twist: Twist) -> Frame<f64> {
+        Frame::new(self.position, DMat3::from_quat(self.rotation), twist.linear, twist.angular)
+    }
+
     /// Writes a slice of Q; of a particle's, the position alone.
     pub fn write(self, q: &mut [f64]) {
         q[..3].copy_from_slice(&self.position.to_array());
@@ -271,14 +276,7 @@ impl Node {
 
     /// Frame at the start of the tick.
     pub fn start_frame(&self) -> Frame<f64> {
-        let Pose { position, rotation } = self.start;
-        Frame::new(position, DMat3::from_quat(rotation), self.before.linear, self.before.angular)
-    }
-
-    /// Frame after a tick of `dt` with twist `u`.
-    pub fn frame(&self, u: Twist, dt: f64) -> Frame<f64> {
-        let Pose { position, rotation } = self.pose(u, dt);
-        Frame::new(position, DMat3::from_quat(rotation), u.linear, u.angular)
+        self.start.frame(self.before)
     }
 
     /// Pose after a tick of `dt` with twist `u`.
@@ -309,20 +307,24 @@ impl Body {
         }
     }
 
-    /// Writes the state of a particle or rigid body after a tick with twist `u` at its end.
-    pub fn advance(&self, node: &Node, u: Twist, dt: f64, state: &mut State) {
+    /// Writes the state of a particle or rigid body after a tick with twist `u` at its end, which brought it to `pose`.
+    pub fn advance(&self, node: &Node, u: Twist, pose: Pose, state: &mut State) {
+        pose.write(state.q_mut(self.slice));
+        let angular = self.spin_after(node, u, pose);
+        self.set_twist(Twist { linear: u.linear, angular }, state);
+    }
+
+    /// Angular velocity at the end of a tick with twist `u` that ended with `pose`, rad/s.
+    fn spin_after(&self, node: &Node, u: Twist, pose: Pose) -> DVec3 {
         match self.kind {
-            DofKind::Particle => particle::advance(self, node, u, dt, state),
-            _ => rigid_body::advance(self, node, u, dt, state),
+            DofKind::Particle => DVec3::ZERO,
+            _ => rigid_body::spin_after(self, node, u, pose.rotation),
         }
     }
 
     /// Writes the twist `u` at the end of a tick, for a particle or rigid body that has been moved already.
     pub fn keep_twist(&mut self, node: &Node, u: Twist, state: &mut State) {
-        let angular = match self.kind {
-            DofKind::Particle => DVec3::ZERO,
-            _ => rigid_body::spin_after(self, node, u, self.pose(state).rotation),
-        };
+        let angular = self.spin_after(node, u, self.pose(state));
         self.set_twist(Twist { linear: u.linear, angular }, state);
         self.remember_impulse(node, u);
     }

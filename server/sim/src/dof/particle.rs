@@ -4,7 +4,6 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::{Body, Node, Pose, Twist};
 use crate::potential::gravity::Gravity;
-use crate::state::State;
 
 /// Numbers in Q and in Q'.
 pub(crate) const SIZE: (u32, u32) = (3, 3);
@@ -33,10 +32,4 @@ pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: Gravity)
         wheel_axis: None,
         guessed_spin: None,
     }
-}
-
-pub(super) fn advance(body: &Body, node: &Node, u: Twist, dt: f64, state: &mut State) {
-    let q1 = node.start.position + dt * u.linear;
-    state.q_mut(body.slice).copy_from_slice(&q1.to_array());
-    state.v_mut(body.slice).copy_from_slice(&u.linear.to_array());
 }

@@ -5,7 +5,6 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::{Body, Node, Pose, Twist};
 use crate::potential::gravity::Gravity;
-use crate::state::State;
 
 /// Numbers in Q and in Q'.
 pub(crate) const SIZE: (u32, u32) = (7, 6);
@@ -59,17 +58,6 @@ pub(super) fn node(body: &Body, q: &[f64], v: &[f64], dt: f64, gravity: Gravity)
     }
 }
 
-pub(super) fn advance(body: &Body, node: &Node, u: Twist, dt: f64, state: &mut State) {
-    let Pose { position, rotation } = node.pose(u, dt);
-    let angular = spin_after(body, node, u, rotation);
-    let q = state.q_mut(body.slice);
-    q[..3].copy_from_slice(&position.to_array());
-    q[3..].copy_from_slice(&rotation.to_array());
-    let v = state.v_mut(body.slice);
-    v[..3].copy_from_slice(&u.linear.to_array());
-    v[3..].copy_from_slice(&angular.to_array());
-}
-
 /// Angular velocity at the end of a tick with twist `u` that ends with `rotation`: of the momentum that the body had, plus
 /// what the torques gave.
 pub(super) fn spin_after(body: &Body, node: &Node, u: Twist, rotation: DQuat) -> DVec3 {
@@ -78,7 +66,7 @@ pub(super) fn spin_after(body: &Body, node: &Node, u: Twist, rotation: DQuat) ->
 
 /// R diag(principal) Rᵀ.
 fn turned_out(r: DMat3, principal: DVec3) -> DMat3 {
-    r * DMat3::from_diagonal(principal) * r.transpose()
+    DMat3::from_cols(r.x_axis * principal.x, r.y_axis * principal.y, r.z_axis * principal.z) * r.transpose()
 }
 
 /// R diag(principal) Rᵀ v.

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::block::{Block, Entry};
 use super::figures::{Blocks, Figures};
 use crate::autodiff::Dual;
-use crate::dof::{BLOCK_RATES_MAX, Frame, Node, Twist};
+use crate::dof::{BLOCK_RATES_MAX, Frame, Node, Pose, Twist};
 use crate::potential::anti_roll_bar::AntiRollTerm;
 use crate::potential::axle::AxleTerm;
 use crate::potential::ball_joint::BallJointTerm;
@@ -198,6 +198,8 @@ pub(crate) struct Problem {
     pub unknowns: Vec<Unknown>,
     pub terms: Terms,
     pub figures: Figures,
+    /// At the candidate state: where each particle or rigid body is; nowhere for other unknowns.
+    pub poses: Vec<Pose>,
     /// At the candidate state: one for every unknown, then one for every attachment. After solving, at the end of the tick.
     pub frames: Vec<Frame<f64>>,
     /// Where a solve of this tick ended; empty before. Numbers beyond a block's size are zero.
@@ -225,6 +227,7 @@ impl Problem {
         self.unknowns.clear();
         self.terms.clear();
         self.figures.clear();
+        self.poses.clear();
         self.frames.clear();
         self.solution.clear();
         (self.is_parting, self.looked_again) = (false, false);
@@ -299,11 +302,21 @@ impl Problem {
 
     /// Moves the candidate to the rates `u`.
     pub(super) fn move_to<const D: usize>(&mut self, u: &[Entry<D>]) {
-        self.frames.clear();
-        self.frames.extend(self.unknowns.iter().zip(u).map(|(unknown, u)| match unknown {
-            Unknown::Body(node) => node.frame(twist_of(u), self.dt),
-            Unknown::Rates(_) => Frame::WORLD,
-        }));
+        let Self { poses, frames, unknowns, dt, .. } = self;
+        poses.clear();
+        frames.clear();
+        for (unknown, u) in unknowns.iter().zip(u) {
+            let twist = twist_of(u);
+            let (pose, frame) = match unknown {
+                Unknown::Body(node) => {
+                    let pose = node.pose(twist, *dt);
+                    (pose, pose.frame(twist))
+                }
+                Unknown::Rates(_) => (Pose::IDENTITY, Frame::WORLD),
+            };
+            poses.push(pose);
+            frames.push(frame);
+        }
         self.figures.move_to(u, self.dt, &mut self.frames);
     }
 

@@ -71,7 +71,7 @@ impl Solve {
             let stored = |q: &[f64]| own.stored_energy(q, &figure.v1, settings.dt);
             lift(motion(&*own.dof, &figure.q1, &figure.v1).moment) + stored(q) - stored(&figure.q1)
         } else if self.node(active.start).is_some() {
-            lift(body.mass * self.problem.frames[active.start as usize].pose().position)
+            lift(body.mass * self.problem.poses[active.start as usize].position)
         } else {
             0.0
         }

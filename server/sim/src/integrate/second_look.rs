@@ -56,8 +56,8 @@ impl Integrator {
                 return Course::Body(body.pose(scene.state), Twist::REST);
             }
             if let Some(solve) = solve {
-                let frame = &solve.problem.frames[active.start as usize];
-                return Course::Body(frame.pose(), frame.twist());
+                let start = active.start as usize;
+                return Course::Body(solve.problem.poses[start], solve.problem.frames[start].twist());
             }
             let node = body.node(scene.state, scene.settings.dt, scene.settings.field());
             Course::Body(node.pose(node.target, scene.settings.dt), node.target)

@@ -206,20 +206,21 @@ fn land(
     match (&body.figure, solve) {
         (None, Some(Solve { rest: Some(_), .. })) => report.dof += state.v(body.slice).len(),
         (None, solve) => {
-            let twist = |solve: &Solve| solve.problem.frames[active.start as usize].twist();
-            let solved = solve.and_then(|solve| Some((solve.node(active.start)?, twist(solve))));
+            let start = active.start as usize;
+            let end = |problem: &Problem| (problem.frames[start].twist(), problem.poses[start]);
+            let solved = solve.and_then(|solve| Some((solve.node(active.start)?, end(&solve.problem))));
             let free;
-            let (node, twist) = match solved {
+            let (node, (twist, pose)) = match solved {
                 Some(solved) => solved,
                 None => {
                     free = body.node(state, settings.dt, settings.field());
-                    (&free, free.target)
+                    (&free, (free.target, free.pose(free.target, settings.dt)))
                 }
             };
             if settings.audit_energy {
                 report.work_put_in += settings.dt * (body.force.dot(twist.linear) + body.torque.dot(twist.angular));
             }
-            body.advance(node, twist, settings.dt, state);
+            body.advance(node, twist, pose, state);
             body.remember_impulse(node, twist);
             report.dof += if node.rotates { 6 } else { 3 };
             if !body.is_sane(state) {
