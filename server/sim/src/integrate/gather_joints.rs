@@ -166,7 +166,7 @@ impl Solve {
         let [chassis, wheel] = frames.map(|frame| self.node(frame));
         let (dt, stiffness) = (sources.scene.settings.dt, sources.scene.settings.solver.joint_stiffness);
         let term = AxleTerm::new(frames, desc, [chassis?, wheel?], stiffness, dt);
-        self.carry_wheel(ends, [term.axis(), DVec3::Z]);
+        self.head_wheel(ends[1]);
         self.problem.terms.axles.push(term);
         Some(())
     }

@@ -18,11 +18,18 @@ pub(super) fn find(scene: &mut Scene) {
     for &id in scene.order {
         (scene.bodies[id].wheel_axis, scene.bodies[id].wheel_turn) = (None, DVec3::ZERO);
     }
+    let mut carrier = None;
     for (_, axle) in scene.potentials.axles.awake() {
         let Some(chassis) = scene.bodies.get(axle.chassis).filter(|chassis| !chassis.quarantined) else { continue };
-        let carrier = (chassis.pose(scene.state).rotation, chassis.twist(scene.state).angular);
-        let turned = DQuat::from_scaled_axis(scene.settings.dt * carrier.1) * carrier.0;
-        let headed = turned * DQuat::from_rotation_y(axle.control.steer) * DVec3::Z;
+        let turned = match carrier {
+            Some((id, turned)) if id == axle.chassis => turned,
+            // Most chassis carry several wheels, one after the other.
+            _ => {
+                let turn = DQuat::from_scaled_axis(scene.settings.dt * chassis.twist(scene.state).angular);
+                carrier.insert((axle.chassis, turn * chassis.pose(scene.state).rotation)).1
+            }
+        };
+        let headed = turned * axle.control.axis();
         let wheel = &mut scene.bodies[axle.wheel];
         wheel.wheel_turn = turn_between(wheel.pose(scene.state).rotation * DVec3::Z, headed);
         wheel.wheel_axis = Some(DVec3::Z);
@@ -73,6 +80,15 @@ fn speed_about(body: &Body, axis: DVec3, state: &State) -> f64 {
 }
 
 impl Solve {
+    /// Newton starts with a wheel on an axle that gets to where it is headed within the tick, and spins on.
+    pub(super) fn head_wheel(&mut self, end: End) {
+        if let Some(Unknown::Body(node)) = self.problem.unknowns.get_mut(end.frame as usize)
+            && let Some(headed) = node.wheel_axis
+        {
+            node.guessed_spin = Some(node.following(node.start.rotation * DVec3::Z, headed, self.problem.dt));
+        }
+    }
+
     /// Where one of two ends that share a direction, given in both frames, is a wheel about it: the axis about which it
     /// spins in the tick. Newton then starts with a wheel whose axis follows what carries it, as that turned in the last tick; the
     /// wheel's own momentum says something else, it resists any turn of its axis.

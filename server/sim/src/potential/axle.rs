@@ -4,7 +4,7 @@
 //! Suspension is the author's stiffness; what keeps the hub on its line and the wheel in its plane is penalty whose
 //! stiffness the engine chooses.
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 
 use super::{FrameIndex, PairBlocks, Term, Wrench, outer};
 use crate::autodiff::{Scalar, Vec3};
@@ -59,6 +59,12 @@ pub struct Motor {
 const BRAKE_GAIN: f64 = 1e4;
 
 impl AxleControl {
+    /// The wheel's axis as it is steered, in the chassis' frame.
+    pub(crate) fn axis(&self) -> DVec3 {
+        let (sine, cosine) = self.steer.sin_cos();
+        DVec3::new(sine, 0.0, cosine)
+    }
+
     pub(crate) fn validate(&self) -> Result<(), SimError> {
         require(self.steer.abs() < std::f64::consts::FRAC_PI_2, "steer", self.steer, "-90 to 90 degrees")?;
         self.drive.validate().map_err(|reason| reason.of("drive"))?;
@@ -98,7 +104,6 @@ impl AxleTerm {
     /// `joint_stiffness` in reduced masses per dt².
     pub fn new(frames: [FrameIndex; 2], desc: &AxleDesc, nodes: [&Node; 2], joint_stiffness: f64, dt: f64) -> Self {
         let [chassis, wheel] = nodes;
-        let axis = DQuat::from_rotation_y(desc.control.steer) * DVec3::Z;
         let spin_axis = wheel.free_rotation * DVec3::Z;
         let across = spin_axis.any_orthonormal_vector();
         let inertia = |node: &Node| across.dot(node.inertia * across);
@@ -109,16 +114,11 @@ impl AxleTerm {
             desc: *desc,
             hub_stiffness: joint_stiffness * reduced(chassis.mass, wheel.mass) / (dt * dt),
             plane_stiffness: joint_stiffness * reduced(inertia(chassis), inertia(wheel)) / (dt * dt),
-            axis,
+            axis: desc.control.axis(),
             spin_axis,
             start_travel: start.y,
             brake_gain: BRAKE_GAIN * spin_axis.dot(wheel.inertia * spin_axis) / dt,
         }
-    }
-
-    /// The wheel's axis as it is steered, in the chassis' frame.
-    pub fn axis(&self) -> DVec3 {
-        self.axis
     }
 
     /// Hub in the chassis' frame, from where it would be without load, m.
