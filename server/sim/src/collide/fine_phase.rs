@@ -64,17 +64,21 @@ impl FinePhase {
         settings: &Settings,
     ) {
         let meeting = Meeting { a, b: None, surface };
-        let margin = margin(a.twist.linear.length(), reach(a, settings), settings);
         let key = (a.serial, Partner::Static(serial));
         self.manifold.clear();
         match piece.shape() {
             Shape::HalfSpace { normal } => {
                 let normal = pose.rotation * *normal;
+                let margin = margin_above(a, normal, settings);
                 half_space::contacts(a.collider.shape(), a.pose, pose.position, normal, margin, &mut self.manifold);
                 self.update(key, pair, &meeting, settings);
             }
-            Shape::Mesh(mesh) => self.surface(key, pair, (mesh, pose), margin, &meeting, settings),
+            Shape::Mesh(mesh) => {
+                let margin = margin(a.twist.linear.length(), reach(a, settings), settings);
+                self.surface(key, pair, (mesh, pose), margin, &meeting, settings);
+            }
             _ => {
+                let margin = margin(a.twist.linear.length(), reach(a, settings), settings);
                 self.convex(pair, (a.collider, a.pose), (piece, pose), margin, a.spread > 0.0);
                 if let Some(piece) = piece.convex(pose) {
                     self.let_pass(a, Beside::Still(piece), settings);
@@ -194,9 +198,15 @@ impl FinePhase {
 /// Whether a body may come to a half-space within the tick.
 pub(super) fn may_reach(a: &Moving, (piece, pose): (&Collider, Pose), settings: &Settings) -> bool {
     let Shape::HalfSpace { normal } = piece.shape() else { return true };
-    let height = (a.pose.position - pose.position).dot(pose.rotation * *normal);
-    let margin = margin(a.twist.linear.length(), reach(a, settings), settings);
-    height <= a.collider.bounding_radius() + margin
+    let normal = pose.rotation * *normal;
+    let height = (a.pose.position - pose.position).dot(normal);
+    height <= a.collider.bounding_radius() + margin_above(a, normal, settings)
+}
+
+/// Widest gap that a tick may close between a body and a half-space, m. What goes along the plane comes no nearer to it;
+/// what the tick itself turns down is for the second look.
+fn margin_above(a: &Moving, normal: DVec3, settings: &Settings) -> f64 {
+    margin((-a.twist.linear.dot(normal)).max(0.0), reach(a, settings), settings)
 }
 
 /// The point of a manifold where the gap is least.

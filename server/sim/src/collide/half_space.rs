@@ -10,6 +10,7 @@ use crate::dof::Pose;
 ///
 /// A point lies half way between shape and plane; the manifold's normal points from the shape into the ground.
 pub(super) fn contacts(shape: &Shape, pose: Pose, origin: DVec3, normal: DVec3, margin: f64, out: &mut Manifold) {
+    out.normal = -normal;
     let mut add = |core: DVec3, radius: f64, feature: u32| {
         let gap = (core - origin).dot(normal) - radius;
         if gap < margin {
@@ -21,6 +22,11 @@ pub(super) fn contacts(shape: &Shape, pose: Pose, origin: DVec3, normal: DVec3, 
         Shape::HalfSpace { .. } | Shape::Mesh(_) => {}
         Shape::Ball { radius } => add(pose.position, *radius, 0),
         Shape::Box { half } => {
+            let reach = half.dot((pose.rotation.inverse() * normal).abs());
+            let is_above = (pose.position - origin).dot(normal) - reach >= margin;
+            if is_above {
+                return;
+            }
             for corner in 0..8u32 {
                 let sign = |bit: u32| if corner & bit == 0 { -1.0 } else { 1.0 };
                 add(pose.point(*half * DVec3::new(sign(1), sign(2), sign(4))), 0.0, corner);
@@ -39,7 +45,6 @@ pub(super) fn contacts(shape: &Shape, pose: Pose, origin: DVec3, normal: DVec3, 
             }
         }
     }
-    out.normal = -normal;
 }
 
 /// Lowest point of either rim; where the cylinder lies on its flat side, four points of the lower rim.

@@ -4,8 +4,9 @@ use glam::{DMat3, DVec3};
 use slotmap::SlotMap;
 
 use super::embedded_hull::{Deformed, Motion};
+use super::kdop::{greater, lesser};
 use super::shape::{Collider, Shape};
-use super::{Bound, Moving};
+use super::{Bound, Moving, SLABS};
 use crate::dof::{Body, BodyId, FigureBody, Placed, Pose, Twist};
 use crate::settings::Settings;
 use crate::state::State;
@@ -73,12 +74,14 @@ pub(super) struct Hull {
 }
 
 /// Whether a tick moves a hull far.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Stride {
     /// By shifting or turning.
     pub is_far: bool,
     /// By turning alone.
     pub turns_far: bool,
+    /// Velocity of its origin at the end of the tick, m/s.
+    pub velocity: DVec3,
 }
 
 impl Hull {
@@ -147,6 +150,12 @@ impl Hull {
         }
     }
 
+    /// Whether the tick brings it nearer to a plane with that normal than it looked when it began, by more than all margins.
+    pub fn dips(&self, normal: DVec3, settings: &Settings) -> bool {
+        let towards = |velocity: DVec3| (-velocity.dot(normal)).max(0.0);
+        settings.dt * (towards(self.stride.velocity) - towards(self.twist.linear)) > settings.contact.margin
+    }
+
     /// Where it is; `None` where its body takes no part.
     pub fn pose(&self) -> Option<Pose> {
         (self.bounds != Bound::EMPTY).then_some(self.pose)
@@ -202,12 +211,12 @@ fn swept_bounds(hull: &Moving, settings: &Settings) -> Bound {
     let slack = settings.contact.margin + settings.dt * (spread + settings.dt * settings.gravity.length());
     let (low, high) = collider.shape().intervals(|v| Bound::along(axes * v));
     let centre = Bound::along(pose.position);
-    let turned = |high: f64| (high + turn).min(radius).max(high) + slack;
-    let turned = Bound {
-        min: std::array::from_fn(|i| centre[i] - turned(-low[i])),
-        max: std::array::from_fn(|i| centre[i] + turned(high[i])),
-    };
-    turned.swept(settings.dt * twist.linear)
+    let turned = |high: f64| greater(lesser(high + turn, radius), high) + slack;
+    let mut swept = Bound::EMPTY;
+    for i in 0..SLABS {
+        (swept.min[i], swept.max[i]) = (centre[i] - turned(-low[i]), centre[i] + turned(high[i]));
+    }
+    swept.swept(settings.dt * twist.linear)
 }
 
 #[cfg(test)]

@@ -474,18 +474,24 @@ impl Detector {
     /// Takes up all bodies with the static geometry that they may touch.
     fn ask_about_statics(&mut self, bodies: Bodies, settings: &Settings) {
         let Self { trees, statics, unbounded, narrow_phase, .. } = self;
-        let unbounded = trees.arrivals().flat_map(|hull| unbounded.iter().map(move |&id| (hull, id)));
-        let unbounded = unbounded.filter(|&(hull, id)| {
-            let body = trees.hull(hull).moving(bodies);
-            body.is_some_and(|body| may_reach(&body, (&statics[id].collider, statics[id].pose), settings))
-        });
-        for (hull, id) in trees.pairs_with_fixed().chain(unbounded) {
+        let mut ask = |hull: u32, id: StaticId| {
             let (body, piece) = (trees.hull(hull), &statics[id]);
-            let Some(collider) = body.collider(bodies) else { continue };
-            if collider.meets(&piece.collider) {
+            if let Some(collider) = body.collider(bodies).filter(|collider| collider.meets(&piece.collider)) {
                 let key = (body.placed.serial, Partner::Static(piece.serial));
                 let is_sensor = collider.is_sensor() || piece.collider.is_sensor();
                 narrow_phase.ask(key, (hull, Other::Piece(id)), is_sensor, settings);
+            }
+        };
+        trees.pairs_with_fixed().for_each(|(hull, id)| ask(hull, id));
+        if unbounded.is_empty() {
+            return;
+        }
+        for hull in trees.arrivals() {
+            let Some(body) = trees.hull(hull).moving(bodies) else { continue };
+            for &id in unbounded.iter() {
+                if may_reach(&body, (&statics[id].collider, statics[id].pose), settings) {
+                    ask(hull, id);
+                }
             }
         }
     }

@@ -153,7 +153,8 @@ impl<'a> Candidates<'a> {
             _ => twist.angular,
         };
         let (turn, far) = (dt * across.length() * radius, MOVED * radius);
-        Some(Stride { is_far: turn + dt * (twist.linear.length() + spread) > far, turns_far: turn + dt * spread > far })
+        let is_far = turn + dt * (twist.linear.length() + spread) > far;
+        Some(Stride { is_far, turns_far: turn + dt * spread > far, velocity: twist.linear })
     }
 }
 
@@ -180,17 +181,19 @@ impl Side<'_> {
 }
 
 impl Detector {
-    /// Finds out what `candidates` move far. Answers whether there is something to look at again.
-    pub fn find_strides(&mut self, candidates: &Candidates, settings: &Settings) -> bool {
-        self.trees.set_strides(|hull| candidates.stride(hull, settings.dt))
+    /// Finds the pairs of the tick of which `candidates` move one far. Answers whether there is one to look at again.
+    pub fn pick_pairs(&mut self, candidates: &Candidates, settings: &Settings) -> bool {
+        self.glances.clear();
+        if self.trees.set_strides(|hull| candidates.stride(hull, settings.dt)) {
+            self.pick_bodies();
+            self.pick_statics(settings);
+        }
+        self.glances.len() > 0
     }
 
-    /// Looks again at the pairs of the tick that move far, where `candidates` has them. Answers whether points were added
-    /// to [`Detector::second`], where those of earlier looks stay.
+    /// Looks again at the pairs that [`Detector::pick_pairs`] found, where `candidates` has them. Answers whether points
+    /// were added to [`Detector::second`], where those of earlier looks stay.
     pub fn look_again(&mut self, candidates: &Candidates, settings: &Settings, threads: &Threads) -> bool {
-        self.glances.clear();
-        self.pick_bodies();
-        self.pick_statics();
         let Self { trees, materials, statics, contacts, second, narrow_phase, beliefs, glances, .. } = self;
         beliefs.clear();
         beliefs.extend(second.iter().map(|SecondPoint { contact, .. }| ((contact.a, contact.b), contact.believed_gap)));
@@ -230,15 +233,22 @@ impl Detector {
     }
 
     /// Picks the bodies that move far past static geometry.
-    fn pick_statics(&mut self) {
+    fn pick_statics(&mut self, settings: &Settings) {
         let Self { trees, statics, unbounded, glances, .. } = self;
-        let unbounded = trees.awake().flat_map(|hull| unbounded.iter().map(move |&id| (hull, id)));
-        for (hull, id) in trees.pairs_awake_with_fixed().chain(unbounded) {
-            let stride = trees.hull(hull).stride;
-            // Gaps to a half-space are linear in all motion but turns.
-            let is_flat = matches!(statics[id].collider.shape(), Shape::HalfSpace { .. });
-            if if is_flat { stride.turns_far } else { stride.is_far } {
+        for (hull, id) in trees.pairs_awake_with_fixed() {
+            if trees.hull(hull).stride.is_far {
                 glances.take(hull, Other::Piece(id));
+            }
+        }
+        for key in trees.awake() {
+            let hull = trees.hull(key);
+            for &id in unbounded.iter().filter(|_| hull.stride.is_far) {
+                let Static { collider, pose, .. } = &statics[id];
+                let Shape::HalfSpace { normal } = collider.shape() else { continue };
+                // Gaps to a half-space are linear in all motion but turns; those that were wide are not known.
+                if hull.stride.turns_far || hull.dips(pose.rotation * *normal, settings) {
+                    glances.take(key, Other::Piece(id));
+                }
             }
         }
     }

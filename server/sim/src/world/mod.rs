@@ -114,7 +114,7 @@ impl World {
             integrator.find_candidates(&scene);
             let bodies = Bodies { bodies: &self.bodies, state: &self.state };
             let candidates = self.integrator.candidates(bodies);
-            if !self.detector.find_strides(&candidates, &self.settings) {
+            if !self.detector.pick_pairs(&candidates, &self.settings) {
                 break;
             }
             self.integrator.tell_beliefs(&mut self.detector);
