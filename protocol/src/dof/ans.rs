@@ -29,10 +29,14 @@ pub trait Coder {
     fn few(&mut self, value: u32, count: u32) -> u32;
 
     /// The same of at most 32 bits: the high [`FEW`] first, then the others.
+    #[inline]
     fn raw(&mut self, value: u32, count: u32) -> u32 {
-        if (1..=FEW).contains(&count) {
-            return self.few(value, count);
-        }
+        if (1..=FEW).contains(&count) { self.few(value, count) } else { self.many(value, count) }
+    }
+
+    /// None, or any number of them.
+    #[inline(never)]
+    fn many(&mut self, value: u32, count: u32) -> u32 {
         let (mut read, mut left) = (0, count);
         while left > 0 {
             let part = left.min(FEW);

@@ -201,12 +201,16 @@ impl<'a, C: Coder> Walk<'a, C> {
         let Frame { tick, precision, bodies, ticks, groups, models } = next;
         let fineness = precision.fineness();
         let (mut neighbour, mut cursor) = (0, 0);
+        // Nearly all were told at the same tick.
+        let (mut last, mut ahead) = (*tick, Ahead::of(0));
         for (body, told) in bodies.iter().zip(ticks).filter(|(_, told)| **told != *tick) {
             let source = self.source_of(body.id, &mut cursor);
             if self.partial && !models.flag(self.coder, flag::SENT, source.is_some_and(|(sent, _)| sent)) {
                 continue;
             }
-            let ahead = Ahead::of(*tick - *told);
+            if *told != last {
+                (last, ahead) = (*told, Ahead::of(*tick - *told));
+            }
             *told = *tick;
             let states = &mut groups[body.start as usize..][..body.groups.into()];
             let now = source.map(|(_, now)| now);
