@@ -76,21 +76,26 @@ pub(crate) fn product_sub<const D: usize>(a: &Block<D>, b: &Block<D>, c: &mut Bl
 /// Cholesky factor L of a symmetric block, A = L Lᵀ, with the reciprocals of its pivots on the diagonal: what is divided by
 /// them later is multiplied. The strict upper triangle is zero. `None` where a pivot is not above `floor` times its diagonal
 /// entry.
+#[expect(clippy::needless_range_loop, reason = "by iterators it takes twice the instructions")]
 pub(crate) fn cholesky<const D: usize>(a: &Block<D>, floor: f64) -> Option<Block<D>> {
-    let mut l: Block<D> = zero();
+    let mut l = zero();
     for i in 0..D {
-        let (above, rest) = l.split_at_mut(i);
-        let row = &mut rest[0];
-        for (j, other) in above.iter().enumerate() {
-            let left = row[..j].iter().zip(other).fold(a[i][j], |left, (x, y)| left - x * y);
-            row[j] = left * other[j];
+        for j in 0..i {
+            let mut left = a[i][j];
+            for k in 0..j {
+                left -= l[i][k] * l[j][k];
+            }
+            l[i][j] = left * l[j][j];
         }
-        let pivot = row[..i].iter().fold(a[i][i], |left, x| left - x * x);
+        let mut pivot = a[i][i];
+        for k in 0..i {
+            pivot -= l[i][k] * l[i][k];
+        }
         let positive = pivot > floor * a[i][i] && a[i][i] > 0.0;
         if !positive {
             return None;
         }
-        row[i] = pivot.sqrt().recip();
+        l[i][i] = pivot.sqrt().recip();
     }
     Some(l)
 }

@@ -324,6 +324,8 @@ impl<const D: usize> Assemble<'_, D> {
 }
 
 /// target += factor source, the part that both have.
+// What a block is made of is then added as it comes, and the block never written to memory.
+#[inline(always)]
 fn add_scaled<const D: usize, const R: usize>(target: &mut Block<D>, source: &Block<R>, factor: f64) {
     for (target, source) in target.iter_mut().zip(source) {
         for (target, source) in target.iter_mut().zip(source) {

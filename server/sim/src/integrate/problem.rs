@@ -580,7 +580,7 @@ impl<const D: usize> Propose<'_, D> {
 
 impl<const D: usize> Visitor for Propose<'_, D> {
     fn visit<T: Term>(&mut self, terms: &mut [T]) {
-        for term in terms {
+        for term in terms.iter_mut().filter(|_| T::BENDS) {
             term.propose(term.frames().map(|frame| self.displacement(frame)));
         }
     }

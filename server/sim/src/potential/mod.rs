@@ -314,7 +314,8 @@ pub(crate) trait Term {
         self.evaluate(dt, at)
     }
 
-    /// Hears of the Newton step that the linear model proposes, as displacements of both frames, m and rad.
+    /// Hears of the Newton step that the linear model proposes, as displacements of both frames, m and rad. Told are those
+    /// that bend.
     fn propose(&mut self, _step: [Twist; 2]) {}
 
     /// Raises a stiffness that the engine chose, where the candidate, which is nearly the solution, leaves a gap above

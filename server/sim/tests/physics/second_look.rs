@@ -104,7 +104,7 @@ fn throw_crates(world: &mut World, shift: f64) {
 }
 
 /// What lies above the ground, or flies along it, and is struck down within a tick, is not struck through it: nothing at
-/// the start of the tick said that it would come near. Without the look at half-spaces the slab ends below the ground.
+/// the start of the tick said that it would come near. Without the look at half-spaces the slab ends 26 cm deep in it.
 #[test]
 fn what_is_struck_down_does_not_end_beneath_the_ground() {
     for speed in [0.0, 20.0] {
