@@ -184,14 +184,20 @@ fn contact(normal: DVec3, gap: f64, anchor: DVec3, arms: [DVec3; 2], normal_forc
 
 proptest! {
     #[test]
-    fn rolling_derives(n in vector(), turn in vector(), force in 1.0..500.0f64, t in frame(), u in frame()) {
+    fn rolling_derives(
+        n in vector(), turn in vector(), force in 1.0..500.0f64, speed in prop_oneof![Just(1.0), Just(1e-3)],
+        t in frame(), u in frame(),
+    ) {
         prop_assume!(n.length() > 0.1);
         let mut point = ContactPoint::at(DVec3::ZERO, n.normalize(), 0.0, 0.7);
-        (point.turn, point.normal_force) = (turn * 0.01, force);
+        // Saturated, and not.
+        (point.turn, point.normal_force) = (turn * 0.01 * speed, force);
         (point.surface.rolling_resistance, point.surface.spinning_resistance) = (0.05, 0.2);
         let contact = contact(point.normal, 0.0, DVec3::ZERO, [DVec3::ZERO; 2], force);
         let term = RollingTerm::new(contact, &point, 400.0);
-        check_gradient(&term, &[t, u]);
+        let slow = |f: Frame<f64>| Frame { angular: f.angular * speed, ..f };
+        check_gradient(&term, &[slow(t), slow(u)]);
+        automatic_hessian(&term, &[slow(t), slow(u)], 1e-2);
     }
 
     #[test]
@@ -345,6 +351,7 @@ proptest! {
         let motor = Motor { target_speed: target, gain: 60.0, max_torque: limit };
         for term in [MotorTerm::turning([0, 1], motor, axis), MotorTerm::sliding([0, 1], motor, axis, [a, b])] {
             check_gradient(&term, &[t, u]);
+            automatic_hessian(&term, &[t, u], 1e-5);
         }
         let motor = Motor { max_torque: 1e6, ..motor };
         check_hessian(&MotorTerm::turning([0, 1], motor, axis), &[t, u], 1e-5);
@@ -363,12 +370,27 @@ proptest! {
     }
 
     #[test]
+    fn axle_in_its_place_has_the_exact_hessian(t in frame(), mut u in frame(), hub in vector(), target in -3.0..3.0) {
+        (u.position, u.rotation) = (t.position + t.arm(hub), t.rotation);
+        let drive = Motor { target_speed: target, gain: 60.0, max_torque: 1e6 };
+        let control = AxleControl { steer: 0.0, drive, brake: 0.0 };
+        let (chassis, wheel) = (BodyId::default(), BodyId::default());
+        let desc = AxleDesc { chassis, wheel, hub, stiffness: 400.0, damping: 0.0, control };
+        let nodes = [node(10.0, DVec3::new(1.0, 2.0, 2.5), &t), node(1.0, DVec3::new(0.1, 0.1, 0.2), &u)];
+        let term = AxleTerm::new([0, 1], &desc, [&nodes[0], &nodes[1]], 3.0, DT);
+        check_hessian(&term, &[t, u], 1e-5);
+    }
+
+    #[test]
     fn anti_roll_bar_derives(t in frame(), u in frame(), hub in vector(), other in -0.3..0.3) {
         let (chassis, wheel, control) = (BodyId::default(), BodyId::default(), AxleControl::default());
         let axle = AxleDesc { chassis, wheel, hub, stiffness: 400.0, damping: 30.0, control };
         let term = AntiRollTerm::new([0, 1], &axle, 200.0, other);
         check_gradient(&term, &[t, u]);
         automatic_hessian(&term, &[t, u], 1e-5);
+        // Where it is slack nothing bends, and what is written is exact.
+        let slack = Frame { position: t.position + t.arm(hub + DVec3::Y * other), ..u };
+        check_hessian(&term, &[t, slack], 1e-5);
     }
 
     #[test]
@@ -380,6 +402,7 @@ proptest! {
         let slow = |f: Frame<f64>| Frame { linear: f.linear * 0.3, angular: f.angular * 0.3, ..f };
         let term = contact(n.normalize(), gap, anchor * 0.01, [a, b], force);
         check_gradient(&term, &[slow(t), slow(u)]);
+        automatic_hessian(&term, &[slow(t), slow(u)], 1e-3);
     }
 
     #[test]
@@ -388,16 +411,35 @@ proptest! {
         check_hessian(&contact(n.normalize(), -0.1, DVec3::ZERO, [a, b], 0.0), &[t, u], 1e-4);
     }
 
+    /// Of second order, and of first: the velocity potential.
     #[test]
-    fn pd_controller_derives(target in vector(), point in vector(), max_force in 1.0..1e4, t in frame()) {
-        let control = PdControl { target, target_velocity: DVec3::X };
-        let drive = JointDrive::Position { frequency: 1.0, damping_ratio: 1.0 };
-        let at = Anchor::body(BodyId::default(), point);
-        let desc = PdDesc { at, drive, max_force, control };
-        let end = End { frame: 0, point };
-        let start = t.place(point) + target * 0.1;
-        let term = PdTerm::new(end, &desc, drive.gains(DT).unwrap(), 5.0, start, DT);
-        check_gradient(&term, &[t, Frame::WORLD]);
+    fn pd_controller_derives(
+        target in vector(), velocity in vector(), point in vector(), max_force in 1.0..1e4f64, t in frame(),
+        drive in prop_oneof![
+            Just(JointDrive::Position { frequency: 1.0, damping_ratio: 1.0 }),
+            Just(JointDrive::Velocity { time_constant: 0.2 }),
+        ],
+    ) {
+        let control = PdControl { target, target_velocity: velocity };
+        let controller = |point: DVec3, max_force: f64| {
+            let desc = PdDesc { at: Anchor::body(BodyId::default(), point), drive, max_force, control };
+            let start = t.place(point) + target * 0.1;
+            PdTerm::new(End { frame: 0, point }, &desc, drive.gains(DT).unwrap(), 5.0, start, DT)
+        };
+        let at = [t, Frame::WORLD];
+        let (_, asked) = evaluate(&controller(point, f64::INFINITY), &at);
+        // Off the kink where the limit begins.
+        prop_assume!((DVec3::from_slice(&asked).length() / max_force - 1.0).abs() > 1e-3);
+        let term = controller(point, max_force);
+        check_gradient(&term, &at);
+        automatic_hessian(&term, &at, 1e-5);
+        // At a body's centre nothing bends, and what is written is exact where the force is below its limit.
+        let centred = controller(DVec3::ZERO, f64::INFINITY);
+        let automatic = automatic_hessian(&centred, &at, 1e-5);
+        let written = centred.hessian(DT, [&at[0], &at[1]]).own::<6>(0);
+        for (i, j) in (0..6).flat_map(|i| (0..6).map(move |j| (i, j))) {
+            prop_assert!((written[i][j] - automatic[i][j]).abs() < 1e-5 * automatic[0][0], "({i}, {j}): {written:?}");
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use glam::{DMat3, DQuat, DVec3};
 use super::joint::JointKind;
 use super::turning::{Turning, differentiate};
 use super::well::Well;
-use crate::autodiff::{Scalar, Vec3};
+use crate::autodiff::{Mat3, Scalar, Vec3};
 use crate::eigen::positive_part;
 use crate::error::{LARGEST, SimError, require, require_rotation};
 use crate::potential::PdGains;
@@ -53,21 +53,30 @@ impl JointSpring {
         require((0.0..1e12).contains(&damping), "damping of the spring", damping, "0 to below 1e12 N m s/rad")
     }
 
-    /// Adds the potential of a joint that was at `q0`, is at `q1` and has rates `v1`.
-    pub(super) fn add(&self, kind: JointKind, [q0, q1, v1]: [&[f64]; 3], dt: f64, well: &mut Well) {
-        let stretching = rates(kind, v1);
-        well.energy += self.stored(kind, q1) + 0.5 * self.damping * dt * stretching.length_squared();
-        well.gradient += stretching * self.damping;
-        well.hessian += DMat3::IDENTITY * (self.damping / dt);
+    /// Adds the potential of a joint that was at `q0` and has rates `v1`.
+    pub(super) fn add(&self, kind: JointKind, q0: &[f64], v1: &[f64], dt: f64, well: &mut Well) {
+        let moved = rates(kind, v1) * dt;
         if kind == JointKind::Ball {
-            let start = DQuat::from_slice(q0);
-            let (_, gradient, hessian) = differentiate(stretching * dt, |turn| half_square(&Turning::new(start, turn)));
-            well.gradient += gradient * self.stiffness;
-            well.hessian += positive_part(hessian) * self.stiffness;
+            let (energy, gradient, hessian) = differentiate(moved, |moved| self.evaluate(kind, q0, moved, dt));
+            well.add(energy, gradient, positive_part(hessian));
         } else {
-            well.gradient += stretch(kind, q1) * self.stiffness;
-            well.hessian += DMat3::IDENTITY * self.stiffness;
+            let (energy, gradient) = self.evaluate(kind, q0, Vec3::from(moved), dt);
+            let curvature = self.stiffness + self.damping / dt;
+            well.add(energy, gradient.value(), DMat3::from_diagonal(DVec3::splat(curvature)));
         }
+    }
+
+    /// Energy, J, and its gradient where a tick of `dt` moves the joint by `moved`, from `q0`.
+    fn evaluate<S: Scalar>(&self, kind: JointKind, q0: &[f64], moved: Vec3<S>, dt: f64) -> (S, Vec3<S>) {
+        let (half_square, stretch) = if kind == JointKind::Ball {
+            half_square(&Turning::new(DQuat::from_slice(q0), moved))
+        } else {
+            let stretch = Vec3::constant(rates(kind, q0)) + moved;
+            (stretch.dot(stretch) * 0.5, stretch)
+        };
+        let damping = self.damping / dt;
+        let energy = half_square * self.stiffness + moved.dot(moved) * (0.5 * damping);
+        (energy, stretch * self.stiffness + moved * damping)
     }
 
     /// Energy of a joint at `q`, J.
@@ -152,11 +161,17 @@ impl JointMotor {
         Self { max_force: strength, ..*self }.validate()
     }
 
-    /// Adds the potential of a joint that was at `q0` and has rates `v1`: a bowl around the rates that would be right,
-    /// with a constant slope where the force is at its limit. `inertia` is what the joint feels.
+    /// Adds the potential of a joint during a tick; `inertia` is what it feels.
     pub(super) fn add(&self, kind: JointKind, at: &Driven, inertia: DMat3, well: &mut Well) {
-        let Ok(PdGains { stiffness, damping }) = self.drive.gains(at.dt) else { return };
-        let Some((&max_force, targets)) = at.controls.split_last() else { return };
+        let Some(bowl) = self.bowl(kind, at, inertia) else { return };
+        let rates = rates(kind, at.v1);
+        let (energy, gradient) = bowl.evaluate(Vec3::from(rates));
+        well.add(energy, gradient.value(), bowl.hessian(rates));
+    }
+
+    fn bowl(&self, kind: JointKind, at: &Driven, inertia: DMat3) -> Option<Bowl> {
+        let PdGains { stiffness, damping } = self.drive.gains(at.dt).ok()?;
+        let (&max_force, targets) = at.controls.split_last()?;
         let positions = kind.size().map_or(0, |size| usize::from(size.positions));
         let (target, target_rates) = targets.split_at(positions);
         let error = match kind {
@@ -165,12 +180,43 @@ impl JointMotor {
         };
         let slope = stiffness * at.dt + damping;
         let goal = (error * stiffness + rates(kind, target_rates) * damping) / slope.max(1e-300);
-        let missing = goal - rates(kind, at.v1);
-        let force = inertia * missing * slope;
-        let left = if force.length() > max_force { max_force / force.length() } else { 1.0 };
-        well.energy += left * (1.0 - left / 2.0) * force.dot(missing) * at.dt;
-        well.gradient -= force * left;
-        well.hessian += inertia * (slope * left / at.dt);
+        Some(Bowl { goal, slope: inertia * slope, max_force, dt: at.dt })
+    }
+}
+
+/// What a motor adds to the energy of a tick: a bowl around the rates that would be right, with a constant slope where the
+/// force is at its limit.
+struct Bowl {
+    /// Rates at its bottom.
+    goal: DVec3,
+    /// Force over what is missing of them, N s/m or N m s/rad.
+    slope: DMat3,
+    max_force: f64,
+    dt: f64,
+}
+
+impl Bowl {
+    /// What is missing of the goal, the force that this asks for, and the factor that the limit leaves of it.
+    fn force<S: Scalar>(&self, rates: Vec3<S>) -> (Vec3<S>, Vec3<S>, S) {
+        let missing = Vec3::constant(self.goal) - rates;
+        let force = Mat3::constant(self.slope).multiply(missing);
+        let size = force.length();
+        let left = if size.value() > self.max_force { S::from(self.max_force) / size } else { S::ONE };
+        (missing, force, left)
+    }
+
+    /// Energy, J, and its gradient with respect to displacements. Where several rates share a limit that is reached, no
+    /// energy has such a force, unless they feel the same inertia, and this one is an estimate.
+    fn evaluate<S: Scalar>(&self, rates: Vec3<S>) -> (S, Vec3<S>) {
+        let (missing, force, left) = self.force(rates);
+        let energy = left * (-left / 2.0 + 1.0) * force.dot(missing) * self.dt;
+        (energy, -force.scale(left))
+    }
+
+    /// Positive semidefinite.
+    fn hessian(&self, rates: DVec3) -> DMat3 {
+        let (_, _, left) = self.force(Vec3::from(rates));
+        self.slope * (left / self.dt)
     }
 }
 
@@ -194,33 +240,115 @@ mod tests {
     use super::*;
     use crate::autodiff::Dual;
 
+    const DT: f64 = 1.0 / 30.0;
+
     fn vector() -> impl Strategy<Value = DVec3> {
         prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from_array)
     }
 
+    fn kind() -> impl Strategy<Value = JointKind> {
+        let axis = DVec3::new(0.6, 0.0, 0.8);
+        prop_oneof![
+            Just(JointKind::Hinge { axis }),
+            Just(JointKind::Slider { axis }),
+            Just(JointKind::Universal { axes: [axis, DVec3::Y] }),
+            Just(JointKind::Ball),
+        ]
+    }
+
+    fn drive() -> impl Strategy<Value = JointDrive> {
+        prop_oneof![
+            (0.5..2.0f64, 0.7..2.0f64)
+                .prop_map(|(frequency, damping_ratio)| JointDrive::Position { frequency, damping_ratio }),
+            (0.02..1.0f64).prop_map(|time_constant| JointDrive::Velocity { time_constant }),
+        ]
+    }
+
+    /// Coordinates, or rates, of a joint from three numbers.
+    fn coordinates(kind: JointKind, numbers: DVec3) -> Vec<f64> {
+        numbers.to_array()[..kind.size().map_or(0, |size| usize::from(size.rates))].to_vec()
+    }
+
+    /// The gradient of a potential over displacements, as written, is that of its energy, by automatic differentiation
+    /// and by differences, where it `has_energy`; and so is its derivative, which is answered.
+    fn check(
+        at: DVec3,
+        has_energy: bool,
+        potential: impl Fn(Vec3<Dual<3>>) -> (Dual<3>, Vec3<Dual<3>>),
+    ) -> Result<DMat3, TestCaseError> {
+        let dual = |at: DVec3| {
+            let [x, y, z] = [0, 1, 2].map(|i| Dual::variable(at[i], i));
+            potential(Vec3 { x, y, z })
+        };
+        let (energy, _) = dual(at);
+        let (_, written, rows) = differentiate(at, &potential);
+        let stiff = rows.to_cols_array().into_iter().fold(1.0, |most: f64, k| most.max(k.abs()));
+        let automatic = DVec3::from_array(energy.tangent);
+        let near = |a: DVec3, b: DVec3, accuracy: f64| (a - b).length() < accuracy * (stiff + written.length());
+        prop_assert!(!has_energy || near(automatic, written, 1e-12), "{automatic} {written}");
+        for (i, axis) in DVec3::AXES.into_iter().enumerate() {
+            let h = 1e-6;
+            let (above, below) = (dual(at + axis * h), dual(at - axis * h));
+            let slope = (above.0.value - below.0.value) / (2.0 * h);
+            prop_assert!((slope - automatic[i]).abs() < 1e-7 * (stiff + automatic.length()), "{slope} {automatic}");
+            let column = (above.1.value() - below.1.value()) / (2.0 * h);
+            prop_assert!(near(column, rows.row(i), 1e-6), "{i}: {column} {rows}");
+        }
+        Ok(rows)
+    }
+
     proptest! {
-        /// The derivatives of a ball joint's spring, as written, are those by automatic differentiation of its energy and
-        /// by differences; and so are its second derivatives.
         #[test]
-        fn springs_of_ball_joints_derive(start in vector(), turn in vector()) {
-            let start = DQuat::from_scaled_axis(start * 1.5);
-            let at = |turn: DVec3| {
-                let [x, y, z] = [0, 1, 2].map(|i| Dual::<3>::variable(turn[i], i));
-                half_square(&Turning::new(start, Vec3 { x, y, z }))
+        fn springs_derive(kind in kind(), start in vector(), turn in vector(), damping in 0.0..2.0f64) {
+            let spring = JointSpring { stiffness: 30.0, damping };
+            let v1 = coordinates(kind, turn / DT);
+            let moved = rates(kind, &v1) * DT;
+            let q0 = match kind {
+                JointKind::Ball => DQuat::from_scaled_axis(start * 1.5).to_array().to_vec(),
+                _ => coordinates(kind, start),
             };
-            let (value, gradient) = at(turn);
             // Off half a turn, where the shorter way round changes.
-            prop_assume!(value.value < 4.0);
-            let automatic = DVec3::from_array(value.tangent);
-            prop_assert!((automatic - gradient.value()).length() < 1e-9, "{automatic} {}", gradient.value());
-            let (_, _, hessian) = differentiate(turn, |turn| half_square(&Turning::new(start, turn)));
-            for (i, axis) in DVec3::AXES.into_iter().enumerate() {
-                let h = 1e-6;
-                let (above, below) = (at(turn + axis * h), at(turn - axis * h));
-                prop_assert!(((above.0.value - below.0.value) / (2.0 * h) - automatic[i]).abs() < 1e-7);
-                let column = (above.1.value() - below.1.value()) / (2.0 * h);
-                prop_assert!((column - hessian.col(i)).length() < 1e-6, "{column} {}", hessian.col(i));
+            let turned = || rotation_vector(DQuat::from_scaled_axis(moved) * DQuat::from_slice(&q0)).length();
+            prop_assume!(kind != JointKind::Ball || turned() < 3.0);
+            let automatic = check(moved, true, |moved| spring.evaluate(kind, &q0, moved, DT))?;
+            let mut well = Well::FLAT;
+            spring.add(kind, &q0, &v1, DT, &mut well);
+            // Of what bends, the positive part.
+            let exact = positive_part(automatic);
+            prop_assert!(well.hessian.abs_diff_eq(exact, 1e-9 * (30.0 + damping / DT)), "{} {exact}", well.hessian);
+        }
+
+        #[test]
+        fn motors_derive(
+            kind in kind(), drive in drive(), start in vector(), rate in vector(), targets in (vector(), vector()),
+            inertia in vector(), max_force in prop_oneof![Just(f64::INFINITY), 0.01..1.0f64],
+        ) {
+            let count = coordinates(kind, DVec3::ONE).len();
+            let inertia = DVec3::from_array(std::array::from_fn(|i| if i < count { inertia[i] } else { 0.0 }));
+            let own = DVec3::from_array(std::array::from_fn(|i| if i < count { 1.0 + i as f64 } else { 0.0 }));
+            let inertia = DMat3::from_diagonal(own) + crate::potential::outer(inertia, inertia);
+            let place = |at: DVec3| match kind {
+                JointKind::Ball => DQuat::from_scaled_axis(at).to_array().to_vec(),
+                _ => coordinates(kind, at),
+            };
+            let (q0, v1) = (place(start), coordinates(kind, rate));
+            let controls = [place(targets.0), coordinates(kind, targets.1), vec![max_force]].concat();
+            let motor = JointMotor { drive, max_force };
+            let bowl = motor.bowl(kind, &Driven { dt: DT, q0: &q0, v1: &v1, controls: &controls }, inertia).unwrap();
+            let (missing, force, left) = bowl.force(Vec3::from(rates(kind, &v1)));
+            // Off the kink where the limit begins.
+            prop_assume!((DVec3::from(force).length() / max_force - 1.0).abs() > 1e-3);
+            // Of several rates at their limit there is an estimate of the energy alone.
+            let has_energy = left == 1.0 || count == 1;
+            let moved = rates(kind, &v1) * DT;
+            let automatic = check(moved, has_energy, |moved| bowl.evaluate(moved * DT.recip()))?;
+            let written = bowl.hessian(rates(kind, &v1));
+            if left == 1.0 {
+                prop_assert!(written.abs_diff_eq(automatic, 1e-9 * written.col(0).length()), "{written} {automatic}");
             }
+            let mut well = Well::FLAT;
+            motor.add(kind, &Driven { dt: DT, q0: &q0, v1: &v1, controls: &controls }, inertia, &mut well);
+            prop_assert!(well.gradient.dot(missing.into()) <= 0.0 && well.gradient.length() <= max_force * 1.000_001);
         }
     }
 }

@@ -102,10 +102,10 @@ impl Articulated {
 
     /// All that acts at a joint, at the candidate.
     fn well(&self, joint: &Joint, at: &LocalState) -> Well {
-        let mut well = Well::default();
+        let mut well = Well::FLAT;
         let (q0, q1, v1) = (joint.q(at.q0), joint.q(at.q1), joint.v(at.v1));
         if let Some(spring) = joint.spring {
-            spring.add(joint.kind, [q0, q1, v1], at.dt, &mut well);
+            spring.add(joint.kind, q0, v1, at.dt, &mut well);
         }
         let (held, loose) = at.prepared.split_at(at.prepared.len().min(self.lengths.1));
         if let Some(motor) = joint.motor {

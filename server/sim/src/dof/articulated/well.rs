@@ -6,7 +6,7 @@ use crate::eigen::positive_part;
 
 /// Energy of a joint of one to three rates, with its derivatives with respect to their displacements. What a joint does
 /// not have stays zero.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Well {
     /// J.
     pub energy: f64,
@@ -17,6 +17,16 @@ pub(super) struct Well {
 }
 
 impl Well {
+    /// Nothing acts.
+    pub const FLAT: Self = Self { energy: 0.0, gradient: DVec3::ZERO, hessian: DMat3::ZERO };
+
+    /// Adds a potential over all rates.
+    pub fn add(&mut self, energy: f64, gradient: DVec3, hessian: DMat3) {
+        self.energy += energy;
+        self.gradient += gradient;
+        self.hessian += hessian;
+    }
+
     /// Adds a function of a number that is itself one of the rates' displacements: its slope and curvature there, and
     /// the number's gradient and Hessian. Of what bends the number, the positive part.
     pub fn add_bent(&mut self, [energy, slope, curvature]: [f64; 3], gradient: DVec3, bend: DMat3) {
