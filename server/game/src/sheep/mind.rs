@@ -1,6 +1,8 @@
 //! What a sheep wants: to graze, to walk a little, to be with its flock, and away from what it fears.
 
 use glam::{DQuat, DVec3};
+use rand_pcg::Pcg32;
+use rand_pcg::rand_core::{Rng, SeedableRng};
 
 use super::SheepParameters;
 
@@ -12,21 +14,19 @@ const WALKS: [f64; 2] = [1.5, 4.0];
 /// A wish of the flock shorter than this is not worth a walk.
 const WORTH_A_WALK: f64 = 0.45;
 
-/// Numbers that look random: SplitMix64 (Steele, Lea and Flood, 2014) of a seed and a counter, so that the same sheep in
-/// the same run throws the same.
-#[derive(Clone, Copy, Debug)]
-struct Dice {
-    state: u64,
-}
+/// Numbers that look random, from a generator that answers the same on every machine, so that the same sheep in the same
+/// run throws the same.
+#[derive(Clone, Debug)]
+struct Dice(Pcg32);
 
 impl Dice {
+    fn new(seed: u64) -> Self {
+        Self(Pcg32::seed_from_u64(seed))
+    }
+
     /// 0 to below 1.
     fn throw(&mut self) -> f64 {
-        self.state = self.state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        f64::from(self.0.next_u32()) / (f64::from(u32::MAX) + 1.0)
     }
 }
 
@@ -54,7 +54,7 @@ pub struct View {
 }
 
 /// The mind of a sheep.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Mind {
     dice: Dice,
     mood: Mood,
@@ -67,7 +67,7 @@ pub struct Mind {
 impl Mind {
     /// A mind that grazes; another seed makes another sheep of it.
     pub fn new(seed: u64) -> Self {
-        let mut dice = Dice { state: seed };
+        let mut dice = Dice::new(seed);
         let patience = GRAZES[1] * dice.throw();
         Self { dice, mood: Mood::Grazing, wish: DVec3::ZERO, patience }
     }
@@ -124,7 +124,7 @@ mod tests {
     #[test]
     fn dice_are_even_and_repeat() {
         let thrown = |seed| {
-            let mut dice = Dice { state: seed };
+            let mut dice = Dice::new(seed);
             (0..10_000).map(|_| dice.throw()).collect::<Vec<_>>()
         };
         let first = thrown(7);
