@@ -22,6 +22,13 @@ pub(crate) struct Workspaces<W> {
     pooled: Vec<Mutex<W>>,
 }
 
+impl<W> Workspaces<W> {
+    /// The calling thread's.
+    pub fn own(&mut self) -> &mut W {
+        &mut self.own
+    }
+}
+
 impl Threads {
     /// A pool of `threads` threads; none for one, which is the caller.
     pub fn new(threads: usize) -> Result<Self, ThreadPoolBuildError> {

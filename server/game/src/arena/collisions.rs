@@ -1,6 +1,6 @@
 //! Collisions come before the actors that have them, in the order in which the engine tells of them.
 
-use pita_sim::{BodyId, Collision, CollisionObject, CollisionSide, DVec3, QueryFilter, Shape};
+use pita_sim::{Collision, CollisionObject, CollisionSide, DVec3};
 
 use super::Arena;
 use crate::actor::{Contact, ContactSide, Partner, Response};
@@ -23,7 +23,7 @@ impl Arena {
         for collision in &collisions {
             // Both are asked: hearing of a collision is the actor's only way to know of it.
             let answers = [self.ask(collision, 0), self.ask(collision, 1)];
-            let rolls_over = |side: usize| answers[side] == Response::RollOver && self.rolls_over(collision, side);
+            let mut rolls_over = |side: usize| answers[side] == Response::RollOver && self.rolls_over(collision, side);
             if answers.contains(&Response::Pass) || rolls_over(0) || rolls_over(1) {
                 self.world.cancel_collision(collision.id);
             }
@@ -56,13 +56,11 @@ impl Arena {
     /// Whether a body rolls over what it is about to hit: it has room all along its way, as far above it as a kerb is high.
     /// The plane of the contact, which is that of the start of the tick, would be a ramp that lifts a fast wheel higher than
     /// that, and a wall to a faster one. What the wheel is in when the tick is over lifts it out.
-    fn rolls_over(&self, collision: &Collision, own: usize) -> bool {
+    fn rolls_over(&mut self, collision: &Collision, own: usize) -> bool {
         let sides = [collision.sides[own], collision.sides[1 - own]].map(|side| side.object);
         let [CollisionObject::Body(body), CollisionObject::Static(_)] = sides else { return false };
         let towards = if own == 0 { collision.normal } else { -collision.normal };
-        let (Some(position), Some(rotation), Some(velocity)) =
-            (self.world.position(body), self.world.rotation(body), self.world.velocity(body))
-        else {
+        let (Some(position), Some(velocity)) = (self.world.position(body), self.world.velocity(body)) else {
             return false;
         };
         let way = velocity.with_y(0.0) * self.dt;
@@ -71,18 +69,10 @@ impl Arena {
         if towards.y > 0.0 || forward < KERB * (-towards.y).max(0.5) || samples > SAMPLES_MAX {
             return false;
         }
-        let Some(shape) = self.shape_of(body) else { return false };
         (1..=samples as usize).all(|i| {
             let there = position + way * (i as f64 / samples) + DVec3::Y * KERB;
-            let found = self.world.overlap(shape, there, rotation, &QueryFilter::ALL);
-            found.is_ok_and(|found| !found.iter().any(|object| matches!(object, CollisionObject::Static(_))))
+            self.world.meets_static(body, there) == Ok(false)
         })
-    }
-
-    fn shape_of(&self, body: BodyId) -> Option<&Shape> {
-        let actor = self.actors.get(self.owners.get(&body)?)?;
-        let part = actor.bodies().iter().position(|&own| own == body)?;
-        Some(&actor.describe().parts.get(part)?.shape)
     }
 
     /// Whom a side belongs to. Every body has an actor.

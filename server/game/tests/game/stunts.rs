@@ -244,6 +244,32 @@ fn who_is_wedged_in_stands_still() {
     }
 }
 
+/// A wall of 5 cm, 1 m high, is no kerb: it stops a car at 60 m/s that comes with its nose or with the wheels of a side, and
+/// all of the car stays on this side of it.
+#[test]
+fn a_thin_wall_stops_a_fast_car() {
+    for (yaw, half) in [(0.0, 1.3), (0.5 * std::f64::consts::PI, 0.8)] {
+        for x in [20.0, 20.4, 20.8, 21.2, 21.6] {
+            let wall = format!(
+                "[[statics]]\nshape.box.half = [0.025, 0.5, 20.0]\nmaterial = \"asphalt\"\nposition = [{x:?}, 0.5, 0.0]\n"
+            );
+            let mut track = track(&wall);
+            let rest = track.car(0).position;
+            track.place(0, rest, DQuat::from_rotation_y(yaw), DVec3::X * 60.0);
+            for tick in 0..60 {
+                track.tick();
+                for part in 0..5 {
+                    let at = track.part(0, part).position;
+                    assert!(at.x < x, "yaw {yaw}, wall at {x} m, tick {tick}: part {part} at {at}");
+                }
+            }
+            let car = track.car(0);
+            assert!(car.position.x < x - 0.5 * half && car.velocity.x < 1.0, "yaw {yaw}, wall at {x} m: {car:?}");
+            assert_eq!(track.quarantined(), 0);
+        }
+    }
+}
+
 /// Three kerbs cost a fast car what they do at a sixteenth of the tick, or up to a fifth of its speed less: a tick may take a
 /// wheel from one side of a kerb to the other.
 #[test]

@@ -116,10 +116,10 @@ impl Detector {
         (collider, pose): (&Collider, Pose),
         filter: &QueryFilter,
     ) -> Vec<CollisionObject> {
-        let mut probe = Probe::new(pose.position);
+        let mut fine_phase = FinePhase::default();
         let mut all: Vec<(Order, CollisionObject)> = Vec::new();
         let mut meet = |candidate: Option<Candidate>| {
-            let touching = candidate.filter(|candidate| probe.overlaps(candidate, (collider, pose)));
+            let touching = candidate.filter(|candidate| overlaps(&mut fine_phase, candidate, (collider, pose)));
             all.extend(touching.map(|candidate| (candidate.order, candidate.object)));
         };
         for &id in &self.unbounded {
@@ -130,6 +130,23 @@ impl Detector {
         all.sort_unstable_by_key(|&(order, _)| order);
         all.dedup_by_key(|&mut (order, _)| order);
         all.into_iter().map(|(_, object)| object).collect()
+    }
+
+    /// Whether a collider at `pose` would overlap static geometry. Allocates nothing once warm.
+    pub fn meets_static(&mut self, bodies: Bodies, collider: &Collider, pose: Pose) -> bool {
+        let mut fine_phase = std::mem::take(self.narrow_phase.workspaces().own());
+        let filter = QueryFilter { groups: collider.groups(), ..QueryFilter::ALL };
+        let mut meet = |found: Found| {
+            let candidate = self.candidate(bodies, found, &filter);
+            candidate.is_some_and(|candidate| overlaps(&mut fine_phase, &candidate, (collider, pose)))
+        };
+        let mut met = self.unbounded.iter().any(|&id| meet(Found::Piece(id)));
+        if !met {
+            let bounds = hull::bounds(collider.shape(), pose);
+            self.trees.overlapping_fixed(&bounds, |found| met = met || meet(found));
+        }
+        *self.narrow_phase.workspaces().own() = fine_phase;
+        met
     }
 
     /// What is nearest to `point` and not farther than `within`; of several at the same distance, as with rays.
@@ -228,20 +245,20 @@ impl Probe {
         }
         None
     }
+}
 
-    /// Whether a collider overlaps another one.
-    fn overlaps(&mut self, candidate: &Candidate, (collider, pose): (&Collider, Pose)) -> bool {
-        match (candidate.collider.shape(), collider.shape()) {
-            (_, Shape::HalfSpace { .. }) => false,
-            (Shape::HalfSpace { normal }, shape) => {
-                let normal = candidate.pose.rotation * *normal;
-                let (low, _) = shape.interval(DMat3::from_quat(pose.rotation).transpose() * normal);
-                normal.dot(pose.position - candidate.pose.position) + low <= 0.0
-            }
-            _ => {
-                let other = (candidate.collider, candidate.pose);
-                self.fine_phase.proximity((collider, pose), other, ARRIVED).is_some_and(|found| found.gap <= 0.0)
-            }
+/// Whether a collider overlaps another one.
+fn overlaps(fine_phase: &mut FinePhase, candidate: &Candidate, (collider, pose): (&Collider, Pose)) -> bool {
+    match (candidate.collider.shape(), collider.shape()) {
+        (_, Shape::HalfSpace { .. }) => false,
+        (Shape::HalfSpace { normal }, shape) => {
+            let normal = candidate.pose.rotation * *normal;
+            let (low, _) = shape.interval(DMat3::from_quat(pose.rotation).transpose() * normal);
+            normal.dot(pose.position - candidate.pose.position) + low <= 0.0
+        }
+        _ => {
+            let other = (candidate.collider, candidate.pose);
+            fine_phase.proximity((collider, pose), other, ARRIVED).is_some_and(|found| found.gap <= 0.0)
         }
     }
 }

@@ -335,6 +335,11 @@ impl Trees {
         for tree in [&self.dynamic, &self.sleeping] {
             tree.overlapping(bounds, |key| found(Found::Hull(self.hull(key))));
         }
+        self.overlapping_fixed(bounds, found);
+    }
+
+    /// Hands `found` all static geometry whose bounds overlap `bounds`, in no order.
+    pub fn overlapping_fixed<'a>(&'a self, bounds: &Bound, mut found: impl FnMut(Found<'a>)) {
         self.fixed.overlapping(bounds, |key| found(self.piece(key)));
     }
 

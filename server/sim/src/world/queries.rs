@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 
 use super::World;
 use crate::collide::{Bodies, Collider, CollisionObject, Nearest, QueryFilter, RayHit, Shape};
-use crate::dof::Pose;
+use crate::dof::{BodyId, Pose, Twist};
 use crate::error::{LARGEST, SimError, require, require_direction, require_rotation, require_vector};
 
 impl World {
@@ -44,6 +44,26 @@ impl World {
         collider.validate_moving()?;
         let pose = Pose { position, rotation: rotation.normalize() };
         Ok(self.detector.overlap(self.looked_up(), (&collider, pose), filter))
+    }
+
+    /// Whether a rigid body would overlap static geometry with its centre of mass at `position`, turned as it is. It is not
+    /// about sensors, and allocates nothing once warm.
+    ///
+    /// # Errors
+    /// [`SimError`] for a value out of range, a body that is gone, or a figure.
+    pub fn meets_static(&mut self, id: BodyId, position: DVec3) -> Result<bool, SimError> {
+        require_vector(position, "position")?;
+        let body = self.bodies.get(id).ok_or(SimError::Gone { what: "body" })?;
+        if body.figure.is_some() {
+            return Err(SimError::Unusable { what: "a figure has no pose to look from" });
+        }
+        let pose = Pose { position, ..body.pose(&self.state) };
+        let colliders = self.collider_range(id);
+        let (bodies, detector) = (Bodies { bodies: &self.bodies, state: &self.state }, &mut self.detector);
+        Ok(self.placed[colliders].iter().any(|placed| {
+            let (pose, _) = placed.carried(pose, Twist::REST);
+            bodies.collider(placed).is_some_and(|collider| detector.meets_static(bodies, collider, pose))
+        }))
     }
 
     /// What is nearest to a point and not farther than `within` metres; of several at the same distance, as with rays.

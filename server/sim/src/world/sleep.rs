@@ -1,5 +1,7 @@
 //! Sleeping and waking: bodies, their colliders and their potentials leave the lists that a tick walks, and come back.
 
+use std::ops::Range;
+
 use super::World;
 use crate::collide::Bodies;
 use crate::dof::{ABSENT, BodyId, Placed};
@@ -120,11 +122,16 @@ impl World {
 
     /// Colliders of a body, in order of serial.
     pub(super) fn colliders_of(&self, id: BodyId) -> &[Placed] {
-        let Some(body) = self.bodies.get(id) else { return &[] };
+        &self.placed[self.collider_range(id)]
+    }
+
+    /// Where they are among those of all bodies.
+    pub(super) fn collider_range(&self, id: BodyId) -> Range<usize> {
+        let Some(body) = self.bodies.get(id) else { return 0..0 };
         // A body's first collider has its serial, and the others follow.
         let from = self.placed.partition_point(|placed| placed.serial < body.serial);
         let count = self.placed[from..].iter().take_while(|placed| placed.body == id).count();
-        &self.placed[from..from + count]
+        from..from + count
     }
 
     fn colliders_of_all(&self, group: &[BodyId]) -> Vec<Placed> {

@@ -146,8 +146,34 @@ fn lattice(world: &mut World) {
     add(world, Arc::new(lattice), q, &at);
 }
 
+/// What asks at every step of its way, as a wheel at a kerb does, whether it would meet a wall.
+fn ask(world: &mut World, id: BodyId) -> usize {
+    (0..100).filter(|&i| world.meets_static(id, DVec3::new(0.01 * f64::from(i), 0.5, 0.0)).unwrap()).count()
+}
+
 #[test]
 fn a_warm_tick_allocates_nothing() {
+    questions_allocate_nothing();
+    ticks_allocate_nothing();
+}
+
+fn questions_allocate_nothing() {
+    let mut world = World::new(Settings::at(1.0 / 30.0)).unwrap();
+    let wall = Collider::new(Shape::Box { half: DVec3::new(0.1, 0.5, 1.0) }, 0.5);
+    world.add_static(StaticDesc { position: DVec3::new(1.0, 0.5, 0.0), ..StaticDesc::new(wall) }).unwrap();
+    let wheel = Shape::Cylinder { half_length: 0.12, radius: 0.35, rounding: 0.04 };
+    let desc = RigidBodyDesc::new(DVec3::Y * 0.5, 25.0, wheel.inertia(25.0));
+    let id = world.add_rigid_body(RigidBodyDesc { collider: Some(Collider::new(wheel, 0.5)), ..desc }).unwrap();
+    world.step();
+    let met = ask(&mut world, id);
+    assert!((10..90).contains(&met), "{met} of 100 places are in the wall");
+    let region = Region::new(COUNTER);
+    assert_eq!(ask(&mut world, id), met);
+    let change = region.change();
+    assert_eq!(change.allocations + change.reallocations, 0, "{change:?} in 100 questions");
+}
+
+fn ticks_allocate_nothing() {
     type Scene = (&'static str, fn(&mut World));
     let scenes: [Scene; 7] = [
         ("sheep of bodies", bodies),

@@ -107,6 +107,22 @@ fn a_wheel_at_60_m_s_takes_a_kerb() {
     }
 }
 
+/// A wheel that rolls at 60 m/s into a wall of 5 cm, 1 m high, does not come to lie beyond it, nor rolls over it.
+#[test]
+fn a_wheel_at_60_m_s_does_not_take_a_wall() {
+    for start in [0.0, 0.4, 0.8, 1.2, 1.6] {
+        let mut world = world();
+        ground(&mut world);
+        stand(&mut world, Shape::Box { half: DVec3::new(0.025, 0.5, 6.0) }, DVec3::new(20.0, 0.5, 0.0));
+        let id = rolling_wheel(&mut world, DVec3::new(start, 0.35, 0.0), 60.0);
+        for tick in 0..60 {
+            world.step();
+            let at = world.position(id).unwrap();
+            assert!(at.x < 19.975 - 0.34, "from {start} m: at {at} in tick {tick}");
+        }
+    }
+}
+
 /// A thin bar that turns by up to 0.7 rad a tick about its middle does not come to lie beyond a post in its way.
 #[test]
 fn a_turning_bar_does_not_pass_a_post() {

@@ -1,8 +1,8 @@
 //! Rays, volumes and what is nearest, through all three trees, against closed forms and the slow way.
 
 use pita_sim::{
-    BodyId, Collider, CollisionObject, DQuat, DVec3, Groups, QueryFilter, RigidBodyDesc, Shape, StaticDesc, StaticId,
-    World,
+    BodyId, Collider, CollisionObject, Compound, DQuat, DVec3, Groups, Piece, QueryFilter, RigidBodyDesc, Shape,
+    StaticDesc, StaticId, World,
 };
 
 use super::{body, cube, weightless, world};
@@ -69,6 +69,31 @@ fn volumes_hold_everything_once_and_in_order() {
     assert_eq!((near(1.49), near(1.51)), (vec![awake], vec![]));
     let plane = Shape::HalfSpace { normal: DVec3::Y };
     assert!(world.overlap(&plane, DVec3::ZERO, DQuat::IDENTITY, &ALL).is_err());
+}
+
+/// A body asks where it would meet what never moves: walls and the ground, each of its colliders, and nothing else.
+#[test]
+fn a_body_knows_where_it_would_meet_a_wall() {
+    let (mut world, [asleep, awake, ..]) = street();
+    let [asleep, awake] = [asleep, awake].map(|object| match object {
+        CollisionObject::Body(id) => id,
+        CollisionObject::Static(_) => unreachable!("boxes are bodies"),
+    });
+    let mut meets = |id, x: f64, y: f64| world.meets_static(id, DVec3::new(x, y, 0.0)).unwrap();
+    // The wall's face is at 29.5 m, the ground as far below the origin as a box reaches; other boxes do not matter.
+    for id in [asleep, awake] {
+        assert!(!meets(id, 28.99, 0.1) && meets(id, 29.01, 0.1));
+        assert!(!meets(id, 15.0, 0.01) && meets(id, 15.0, -0.01));
+        assert!(!meets(id, 10.5, 0.01) && !meets(id, 20.5, 0.01));
+    }
+    assert!(world.meets_static(awake, DVec3::NAN).is_err());
+    let ball = |x: f64| Piece::new(Collider::new(Shape::Ball { radius: 0.2 }, 0.5), DVec3::X * x, 100.0);
+    let compound = Compound::new(vec![ball(-1.0), ball(1.0)]).unwrap();
+    let two = world.add_compound(&compound, DVec3::new(0.0, 9.0, 0.0), DQuat::IDENTITY).unwrap();
+    let meets = |world: &mut World, x: f64| world.meets_static(two, DVec3::new(x, 0.1, 0.0)).unwrap();
+    assert!(!meets(&mut world, 28.29) && meets(&mut world, 28.31));
+    world.remove_body(two);
+    assert!(world.meets_static(two, DVec3::ZERO).is_err());
 }
 
 #[test]
