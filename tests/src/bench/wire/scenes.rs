@@ -49,11 +49,11 @@ fn roll(world: &mut World, bodies: &[BodyId], target: DVec3) -> Result<(), Entry
     let (Some(at), Some(velocity)) = (world.position(player), world.velocity(player)) else { return Ok(()) };
     let flat = |v: DVec3| DVec3::new(v.x, 0.0, v.z);
     let missing = flat(target - at).normalize_or_zero() * 6.0 - flat(velocity);
-    world.apply_force(player, (missing * 40.0).clamp_length_max(220.0), at + DVec3::Y * 0.6)?;
+    world.apply_force(player, (missing * 40.0).clamp_length_max(400.0), at + DVec3::Y * 0.6)?;
     for &body in &bodies[1..] {
         let Some(from) = world.position(body) else { continue };
         let pull = (at - from).normalize_or_zero() * 24.0;
-        if at.distance(from) < 2.4 {
+        if at.distance(from) < 2.8 {
             world.apply_force(body, pull, from)?;
             world.apply_force(player, -pull, at)?;
         }
