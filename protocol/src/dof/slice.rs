@@ -26,7 +26,7 @@ type Motion = ([f64; 7], [f64; 6]);
 /// Attached bodies may be attached to attached ones; malicious chains end here.
 const CHAIN_MAX: usize = 8;
 /// Groups of what others are attached to, a rigid body with its rates: it is looked at for each of them.
-const CARRIER_GROUPS_MAX: usize = 4;
+pub(super) const CARRIER_GROUPS_MAX: usize = 4;
 
 impl Frame {
     /// All bodies whose place is known, in order of id, for a stream of `tick_hz` ticks a second.
